@@ -1,0 +1,213 @@
+"""The paper's three contributions as transforms: safety filter, graph observation, reward."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
+from torchrl.envs.transforms import Transform
+
+from forestrl import functional as F
+from forestrl import kernels
+from forestrl import keys as K
+
+
+class SafetyFilter(Transform):
+    """Replaces an infeasible action by the nearest feasible one (Algorithm 1).
+
+    On the way in, ``"action"`` becomes ``u^sigma`` for the env while the root TensorDict keeps the
+    policy's ``u^pi``, so that log-probabilities and the loss see what the policy chose. On the way
+    out it reports what was done.
+
+    Writes ``("safety", "feasible")`` bool ``[*B, 9]``, which actions are feasible from here;
+    ``("safety", "executed")`` int64 ``[*B]``, ``u^sigma``; and ``("safety", "intervened")`` bool
+    ``[*B, 1]``, ``u^sigma != u^pi``.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(
+            in_keys=[K.CELLS, K.POSITION],
+            out_keys=[K.FEASIBLE, K.EXECUTED, K.INTERVENED],
+            in_keys_inv=[K.ACTION],
+            out_keys_inv=[K.ACTION],
+        )
+
+    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
+        proposed = tensordict[K.ACTION]
+        feasible = F.feasible(tensordict[K.CELLS], tensordict[K.POSITION])
+        # Set, never written in place: the root shares these tensors.
+        tensordict[K.PROPOSED] = proposed
+        tensordict[K.ACTION] = F.safe_action(proposed, feasible)
+        return tensordict
+
+    def _step(
+        self, tensordict: TensorDictBase, next_tensordict: TensorDictBase
+    ) -> TensorDictBase:
+        executed = tensordict[K.ACTION]  # u^sigma: this tensordict has been through _inv_call
+        return self._report(next_tensordict, executed, executed != tensordict[K.PROPOSED])
+
+    def _reset(
+        self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
+    ) -> TensorDictBase:
+        null = tensordict_reset[K.POSITION][..., 0].new_full(
+            tensordict_reset.batch_size, F.NULL_ACTION
+        )
+        return self._report(tensordict_reset, null, torch.zeros_like(null, dtype=torch.bool))
+
+    def _report(
+        self, tensordict: TensorDictBase, executed: Tensor, intervened: Tensor
+    ) -> TensorDictBase:
+        tensordict[K.FEASIBLE] = F.feasible(tensordict[K.CELLS], tensordict[K.POSITION])
+        tensordict[K.EXECUTED] = executed
+        tensordict[K.INTERVENED] = intervened.unsqueeze(-1)
+        return tensordict
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        """Declares the three keys."""
+        b, n, device = observation_spec.shape, len(F.DISPLACEMENTS), observation_spec.device
+        observation_spec[K.FEASIBLE] = Binary(shape=(*b, n), dtype=torch.bool, device=device)
+        observation_spec[K.EXECUTED] = Categorical(n, shape=b, device=device)
+        observation_spec[K.INTERVENED] = Binary(shape=(*b, 1), dtype=torch.bool, device=device)
+        return observation_spec
+
+
+class ExplorationGraph(Transform):
+    """Observes the agent's map as an exploration graph (Eqs. 1 and 2).
+
+    Writes ``("graph", "x")`` float32 ``[*B, 9 + M, 8]``, ``("graph", "waypoint")`` int64
+    ``[*B, M]``, ``("graph", "length")`` float32 ``[*B, M]`` and ``("graph", "frontiers")`` int64
+    ``[*B, 1]``; see :class:`forestrl.functional.Graph`.
+
+    Args:
+        window: ``k``, side of the local window, cells; odd.
+        max_frontiers: ``M``, room for frontier nodes; the nearest are kept.
+        lidar_range: ``l``, cells, the unit of edge lengths.
+
+    Raises:
+        ValueError: if ``window`` is even or not positive, or ``max_frontiers`` is less than 1.
+    """
+
+    def __init__(
+        self, window: int = 7, max_frontiers: int = 256, lidar_range: float = 5.0
+    ) -> None:
+        check_window(window)
+        if max_frontiers < 1:
+            raise ValueError(f"max_frontiers={max_frontiers} is not allowed: at least 1 is needed")
+        super().__init__(in_keys=[K.CELLS, K.POSITION], out_keys=list(K.GRAPH))
+        self.window, self.max_frontiers, self.lidar_range = window, max_frontiers, lidar_range
+
+    def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
+        graph = kernels.exploration_graph(
+            next_tensordict[K.CELLS],
+            next_tensordict[K.POSITION],
+            window=self.window,
+            max_frontiers=self.max_frontiers,
+            lidar_range=self.lidar_range,
+        )
+        for key, value in zip(K.GRAPH, graph, strict=True):
+            next_tensordict[key] = value
+        return next_tensordict
+
+    def _reset(
+        self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
+    ) -> TensorDictBase:
+        return self._call(tensordict_reset)
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        """Declares the four keys."""
+        b, m, device = observation_spec.shape, self.max_frontiers, observation_spec.device
+        area = observation_spec[K.CELLS].shape[-2:].numel()
+        nodes = (*b, F.WAYPOINTS + m, F.FEATURES)
+        observation_spec[K.NODES] = Bounded(0.0, 1.0, shape=nodes, device=device)
+        observation_spec[K.WAYPOINT] = Categorical(F.WAYPOINTS, shape=(*b, m), device=device)
+        observation_spec[K.LENGTH] = Bounded(0.0, torch.inf, shape=(*b, m), device=device)
+        observation_spec[K.FRONTIERS] = Bounded(
+            0, area, shape=(*b, 1), dtype=torch.int64, device=device
+        )
+        return observation_spec
+
+
+class FrontierPotentialReward(Transform):
+    """Shapes the reward with the change of the frontier potential (Eqs. 6 to 9).
+
+    Writes ``("exploration", "potential")`` float32 ``[*B, 1]``, ``Phi(s)``, and replaces
+    ``"reward"``. An action counts as unsafe if the filter replaced it or if, without a filter, it
+    collided.
+
+    Args:
+        beta: weight of the information gain against the distance.
+        window: ``k``, side of the window the gain is counted in, cells; odd.
+        coverage_goal: ``rho*``, the coverage that earns ``r_explored``.
+        r_explored: ``r_exp``.
+        r_unsafe: ``r_sigma``.
+
+    Raises:
+        ValueError: if ``beta`` is negative, or ``window`` even or not positive.
+    """
+
+    def __init__(
+        self,
+        beta: float = 0.5,
+        window: int = 7,
+        coverage_goal: float = 0.98,
+        r_explored: float = 100.0,
+        r_unsafe: float = -5.0,
+    ) -> None:
+        if beta < 0:
+            raise ValueError(f"beta={beta} is not allowed: it must be 0 or more")
+        check_window(window)
+        super().__init__(in_keys=[K.CELLS, K.POSITION, "reward"], out_keys=[K.POTENTIAL, "reward"])
+        self.beta, self.window, self.coverage_goal = beta, window, coverage_goal
+        self.r_explored, self.r_unsafe = r_explored, r_unsafe
+
+    def _potential(self, tensordict: TensorDictBase) -> Tensor:
+        return kernels.potential(
+            tensordict[K.CELLS], tensordict[K.POSITION], window=self.window, beta=self.beta
+        )
+
+    def _reset(
+        self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
+    ) -> TensorDictBase:
+        tensordict_reset[K.POTENTIAL] = self._potential(tensordict_reset)
+        return tensordict_reset
+
+    def _step(
+        self, tensordict: TensorDictBase, next_tensordict: TensorDictBase
+    ) -> TensorDictBase:
+        potential = tensordict.get(K.POTENTIAL, None)
+        if potential is None:  # stepped from a situation that was written down, not reset
+            potential = self._potential(tensordict)
+        next_tensordict[K.POTENTIAL] = self._potential(next_tensordict)
+        unsafe = next_tensordict[K.COLLISION]
+        if (intervened := next_tensordict.get(K.INTERVENED, None)) is not None:
+            unsafe = unsafe | intervened
+        next_tensordict["reward"] = F.reward(
+            next_tensordict[K.NEW_CELLS],
+            potential,
+            next_tensordict[K.POTENTIAL],
+            explored=next_tensordict[K.COVERAGE] >= self.coverage_goal,
+            unsafe=unsafe,
+            r_explored=self.r_explored,
+            r_unsafe=self.r_unsafe,
+        )
+        return next_tensordict
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        """Declares the potential."""
+        observation_spec[K.POTENTIAL] = Bounded(
+            0.0, 1.0, shape=(*observation_spec.shape, 1), device=observation_spec.device
+        )
+        return observation_spec
+
+    def transform_reward_spec(self, reward_spec: Composite) -> Composite:
+        """Declares the reward unbounded."""
+        for key in reward_spec.keys(True, True):
+            reward_spec[key] = Unbounded(shape=reward_spec[key].shape, device=reward_spec.device)
+        return reward_spec
+
+
+def check_window(window: int) -> None:
+    """Refuses a window without a middle cell."""
+    if window < 1 or window % 2 == 0:
+        raise ValueError(f"window={window} is not allowed: it must be odd and at least 1")
