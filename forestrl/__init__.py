@@ -8,5 +8,5 @@ from importlib.metadata import PackageNotFoundError, version
 
 try:
     __version__ = version("forestrl")
-except PackageNotFoundError:  # a checkout on the path that was never installed
+except PackageNotFoundError:  # pragma: no cover - a checkout that was never installed
     __version__ = "0+unknown"

@@ -1,6 +1,7 @@
 """The world as TorchRL sees it: the forest, and the paper's three contributions as transforms."""
 
 from forestrl.envs.forest import ForestEnv, sample_arena
+from forestrl.envs.training import StaggeredEpisodes
 from forestrl.envs.transforms import ExplorationGraph, FrontierPotentialReward, SafetyFilter
 
 __all__ = [
@@ -8,5 +9,6 @@ __all__ = [
     "ForestEnv",
     "FrontierPotentialReward",
     "SafetyFilter",
+    "StaggeredEpisodes",
     "sample_arena",
 ]

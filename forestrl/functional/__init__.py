@@ -9,6 +9,7 @@ from forestrl.functional.actions import (
     feasible,
     move,
     safe_action,
+    sample_action,
     targets,
 )
 from forestrl.functional.arena import (
@@ -63,6 +64,7 @@ __all__ = [
     "reveal",
     "reward",
     "safe_action",
+    "sample_action",
     "sample_position",
     "sample_trees",
     "scan",

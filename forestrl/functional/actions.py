@@ -80,3 +80,22 @@ def move(trees: Tensor, position: Tensor, action: Tensor) -> tuple[Tensor, Tenso
     target = position + DISPLACEMENTS.to(position.device)[action]
     collision = gather(trees, target.unsqueeze(-2), outside=True).squeeze(-1)
     return torch.where(collision.unsqueeze(-1), position, target), collision
+
+
+def sample_action(weight: Tensor, uniform: Tensor) -> Tensor:
+    """Draws an action by inverting the cumulative distribution.
+
+    Args:
+        weight: probabilities of the actions up to a common factor, float ``[*B, 9]``, not all 0.
+        uniform: draws from [0, 1), float ``[*B]``.
+
+    Returns:
+        int64 ``[*B]``.
+
+    Examples:
+        >>> sample_action(torch.tensor([0.0, 1.0, 3.0]), torch.tensor(0.25)).item()
+        2
+    """
+    cumulative = weight.double().cumsum(-1)
+    below = cumulative <= uniform.double().unsqueeze(-1) * cumulative[..., -1:]
+    return below.sum(-1)

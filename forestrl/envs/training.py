@@ -1,0 +1,67 @@
+"""What training does to episodes and evaluation does not."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from torchrl.data import Bounded, Composite
+from torchrl.envs.transforms import Transform
+
+from forestrl import keys as K
+
+_HORIZON = "horizon"
+
+
+class StaggeredEpisodes(Transform):
+    """Cuts training episodes short, the first ones at staggered times.
+
+    An episode is truncated after ``steps`` steps, so that many forests are seen; the first episode
+    of every arena is cut at a time drawn uniformly, so that the arenas of a batch are in all
+    phases of exploration from the start. The horizon travels in the TensorDict under
+    ``"horizon"``, int64 ``[*B, 1]``.
+
+    Args:
+        steps: length of a training episode.
+        seed: seed of the first horizons.
+
+    Raises:
+        ValueError: if ``steps`` is less than 1.
+    """
+
+    def __init__(self, steps: int = 500, seed: int = 0) -> None:
+        if steps < 1:
+            raise ValueError(f"episode_steps={steps} is not allowed: at least 1 is needed")
+        super().__init__(in_keys=[K.STEP_COUNT], out_keys=[_HORIZON])
+        self.steps = steps
+        self.rng = torch.Generator().manual_seed(seed)
+
+    def _reset(
+        self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
+    ) -> TensorDictBase:
+        horizon = torch.full_like(tensordict_reset[K.STEP_COUNT], self.steps)
+        if tensordict is None or "_reset" not in tensordict.keys():
+            first = torch.randint(1, self.steps + 1, horizon.shape, generator=self.rng)
+            horizon = first.to(horizon.device)
+        tensordict_reset[_HORIZON] = horizon
+        return tensordict_reset
+
+    def _step(
+        self, tensordict: TensorDictBase, next_tensordict: TensorDictBase
+    ) -> TensorDictBase:
+        horizon = tensordict[_HORIZON]
+        cut = next_tensordict["truncated"] | (next_tensordict[K.STEP_COUNT] >= horizon)
+        next_tensordict[_HORIZON] = horizon
+        next_tensordict["truncated"] = cut
+        next_tensordict["done"] = next_tensordict["terminated"] | cut
+        return next_tensordict
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        """Declares the horizon."""
+        observation_spec[_HORIZON] = Bounded(
+            1,
+            self.steps,
+            shape=(*observation_spec.shape, 1),
+            dtype=torch.int64,
+            device=observation_spec.device,
+        )
+        return observation_spec

@@ -1,0 +1,160 @@
+"""Proximal policy optimisation with the paper's schedule (Table III)."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModule
+from torch import Tensor, nn
+from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDictReplayBuffer
+from torchrl.objectives import ClipPPOLoss
+from torchrl.objectives.value import GAE
+
+from forestrl import keys as K
+
+_LEARNT_FROM = (*K.GRAPH, "action", "action_log_prob", "advantage", "value_target", "state_value")
+
+
+class PPO:
+    """Updates actor and critic from one batch of experience at a time.
+
+    Advantages are estimated once a batch by GAE and normalised over it; then every epoch shuffles
+    the batch anew and takes one Adam step a minibatch. A truncated episode bootstraps from its last
+    state.
+
+    Args:
+        actor: writes ``"action"`` and ``"action_log_prob"``.
+        critic: writes ``"state_value"``.
+        frames_per_batch: frames an update learns from, counted over all arenas ("rollouts").
+        num_minibatches: minibatches an epoch.
+        num_epochs: passes over a batch.
+        lr: Adam's learning rate.
+        gamma: discount factor.
+        gae_lambda: lambda of the generalised advantage estimate.
+        clip_epsilon: clipping parameter of the probability ratio.
+        critic_coeff: weight of the squared value error.
+        entropy_coeff: weight of the entropy bonus.
+        max_grad_norm: bound on the norm of the gradient of both networks together.
+
+    Raises:
+        ValueError: if ``num_minibatches`` does not divide ``frames_per_batch``, or a value is out
+            of its range.
+    """
+
+    def __init__(
+        self,
+        actor: TensorDictModule,
+        critic: TensorDictModule,
+        *,
+        frames_per_batch: int = 1024,
+        num_minibatches: int = 64,
+        num_epochs: int = 8,
+        lr: float = 3e-4,
+        gamma: float = 0.99,
+        gae_lambda: float = 0.95,
+        clip_epsilon: float = 0.2,
+        critic_coeff: float = 1.0,
+        entropy_coeff: float = 0.0,
+        max_grad_norm: float = 0.5,
+    ) -> None:
+        if num_minibatches < 1 or frames_per_batch % num_minibatches:
+            raise ValueError(
+                f"num_minibatches={num_minibatches} is not allowed: it must divide "
+                f"frames_per_batch={frames_per_batch}"
+            )
+        for name, value in (("num_epochs", num_epochs), ("lr", lr), ("clip_epsilon", clip_epsilon)):
+            if value <= 0:
+                raise ValueError(f"{name}={value} is not allowed: it must be more than 0")
+        for name, value in (("gamma", gamma), ("gae_lambda", gae_lambda)):
+            if not 0 <= value <= 1:
+                raise ValueError(f"{name}={value} is not allowed: it must be in [0, 1]")
+        self.actor, self.critic = actor, critic
+        self.frames_per_batch, self.num_epochs = frames_per_batch, num_epochs
+        self.max_grad_norm = max_grad_norm
+        # The values are computed here, so that each state passes through the critic once.
+        self.advantage = GAE(
+            gamma=gamma, lmbda=gae_lambda, value_network=None, average_gae=True, vectorized=True
+        )
+        self.loss = ClipPPOLoss(
+            actor,
+            critic,
+            clip_epsilon=clip_epsilon,
+            critic_coeff=critic_coeff,
+            entropy_bonus=True,
+            entropy_coeff=entropy_coeff,
+            loss_critic_type="l2",
+            functional=False,
+        )
+        self.parameters = [*actor.parameters(), *critic.parameters()]
+        self.optimizer = torch.optim.Adam(self.parameters, lr=lr, fused=True)
+        self.minibatches = TensorDictReplayBuffer(
+            storage=LazyTensorStorage(frames_per_batch),
+            sampler=SamplerWithoutReplacement(),
+            batch_size=frames_per_batch // num_minibatches,
+        )
+
+    def update(self, batch: TensorDictBase) -> dict[str, float]:
+        """Learns from one batch of experience.
+
+        Args:
+            batch: what a collector returns, ``[*B, T]`` frames, time last.
+
+        Returns:
+            the mean over all minibatches of each part of the loss and of its diagnostics.
+        """
+        self.estimate_advantage(batch)
+        self.minibatches.empty()
+        self.minibatches.extend(batch.select(*_LEARNT_FROM).reshape(-1))
+        totals, steps = None, 0
+        for _ in range(self.num_epochs):
+            for minibatch in self.minibatches:
+                measured = self._step(minibatch)
+                totals = measured if totals is None else totals + measured
+                steps += 1
+        means = (totals / steps).tolist()
+        metrics = dict(zip(_MEASURED.values(), means, strict=True))
+        return metrics | {"ppo/explained_variance": explained_variance(batch)}
+
+    @torch.no_grad()
+    def estimate_advantage(self, batch: TensorDictBase) -> None:
+        """Adds ``"state_value"``, ``"advantage"`` and ``"value_target"`` to a batch.
+
+        The value of a next state is the next frame's, except where an episode or the batch ends.
+        """
+        time = batch.ndim - 1
+        value = self._value(batch)
+        next_value = torch.cat((value.narrow(time, 1, value.shape[time] - 1), value[..., -1:, :]), time)
+        ends = batch["next", "done"].squeeze(-1).clone()
+        ends[..., -1] = True
+        next_value[ends] = self._value(batch["next"].select(*K.GRAPH)[ends])
+        batch["state_value"], batch["next", "state_value"] = value, next_value
+        self.advantage(batch)
+
+    def _value(self, states: TensorDictBase) -> Tensor:
+        return self.critic(states.select(*K.GRAPH))["state_value"]
+
+    def _step(self, minibatch: TensorDictBase) -> Tensor:
+        """Takes one Adam step; returns what ``_MEASURED`` lists, float32 ``[n]``."""
+        losses = self.loss(minibatch)
+        self.optimizer.zero_grad()
+        (losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"]).backward()
+        norm = nn.utils.clip_grad_norm_(self.parameters, self.max_grad_norm)
+        self.optimizer.step()
+        losses["grad_norm"] = norm
+        return torch.stack([losses[key].detach() for key in _MEASURED])
+
+
+_MEASURED = {
+    "loss_objective": "loss/objective",
+    "loss_critic": "loss/critic",
+    "entropy": "loss/entropy",
+    "kl_approx": "ppo/kl_approx",
+    "clip_fraction": "ppo/clip_fraction",
+    "grad_norm": "ppo/grad_norm",
+}
+
+
+def explained_variance(batch: TensorDictBase) -> float:
+    """Gives the share of the value targets' variance that the critic explained before the update."""
+    target, value = batch["value_target"], batch["state_value"]
+    return float(1 - (target - value).var() / target.var().clamp_min(1e-8))

@@ -1,0 +1,78 @@
+"""The GATv2 networks bound to their keys: actor and critic for PPO, and the policy for use."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+from tensordict.nn import TensorDictModule, TensorDictSequential
+from torch import Tensor, nn
+from torch.distributions import Categorical
+from torchrl.modules import ProbabilisticActor
+
+from forestrl import functional as F
+from forestrl import keys as K
+from forestrl.policies.gatv2 import Critic, GATv2Encoder
+
+
+class ActorCritic(nn.Module):
+    """The two networks of section 3, of the same shape and with their own weights.
+
+    Args:
+        hidden: channels a head of the first layer (Table II).
+        heads: attention heads of the first layer (Table II).
+        critic_readout: how the critic aggregates the nine outputs.
+        kernel: ``fused``, compiled for the CPU, or ``pyg``, PyTorch Geometric's layers.
+        lidar_range: ``l``, cells, the unit of edge lengths.
+    """
+
+    def __init__(
+        self,
+        hidden: int = 16,
+        heads: int = 4,
+        critic_readout: Literal["mean", "concat"] = "mean",
+        kernel: Literal["fused", "pyg"] = "fused",
+        lidar_range: float = 5.0,
+    ) -> None:
+        super().__init__()
+
+        def encoder() -> GATv2Encoder:
+            return GATv2Encoder(hidden, heads, kernel=kernel, lidar_range=lidar_range)
+
+        self.actor = encoder()
+        self.critic = Critic(encoder(), readout=critic_readout)
+
+    def make_actor(self) -> ProbabilisticActor:
+        """Binds the actor for PPO: samples ``"action"`` and writes its log-probability."""
+        return ProbabilisticActor(
+            TensorDictModule(self.actor, in_keys=list(K.GRAPH), out_keys=[K.LOGITS]),
+            in_keys=[K.LOGITS],
+            distribution_class=Categorical,
+            return_log_prob=True,
+        )
+
+    def make_critic(self) -> TensorDictModule:
+        """Binds the critic for PPO: writes ``"state_value"``."""
+        return TensorDictModule(self.critic, in_keys=list(K.GRAPH), out_keys=["state_value"])
+
+    def make_policy(self, deterministic: bool = False) -> TensorDictSequential:
+        """Binds the policy for use: writes ``"logits"`` and ``"action"``.
+
+        Args:
+            deterministic: take the most probable action instead of sampling with ``"uniform"``.
+        """
+        choose = (
+            TensorDictModule(_mode, in_keys=[K.LOGITS], out_keys=[K.ACTION])
+            if deterministic
+            else TensorDictModule(_sample, in_keys=[K.LOGITS, K.UNIFORM], out_keys=[K.ACTION])
+        )
+        network = TensorDictModule(self.actor, in_keys=list(K.GRAPH), out_keys=[K.LOGITS])
+        return TensorDictSequential(network, choose)
+
+
+def _mode(logits: Tensor) -> Tensor:
+    return logits.argmax(-1)
+
+
+def _sample(logits: Tensor, uniform: Tensor) -> Tensor:
+    return F.sample_action(torch.softmax(logits.double(), -1), uniform)

@@ -1,0 +1,94 @@
+"""Progress of long work: a bar on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from types import TracebackType
+
+from tqdm.auto import tqdm
+
+_SHOWN = {
+    "rollout/return": "return",
+    "rollout/coverage": "coverage",
+    "safety/intervention_rate": "interventions",
+}
+_SECONDS_BETWEEN_LINES = 10
+
+
+class Progress:
+    """Shows how far a training is, counted in frames, with an estimate of the time left.
+
+    Args:
+        total: frames in all.
+        start: frames done before.
+    """
+
+    def __init__(self, total: int, start: int = 0) -> None:
+        self.total, self.done = total, start
+        self.bar = tqdm(
+            total=total, initial=start, unit="frame", unit_scale=True, disable=not sys.stderr.isatty()
+        )
+        self.began = self.last_line = time.monotonic()
+        self.first: tuple[float, int] | None = None  # the first update compiles: not counted
+        self.shown: dict[str, float] = {}
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.bar.close()
+
+    def update(self, frames: int, metrics: dict[str, float]) -> None:
+        """Shows that ``frames`` are done; a metric that is nan keeps its last value."""
+        now = time.monotonic()
+        self.shown |= {n: metrics[key] for key, n in _SHOWN.items() if metrics[key] == metrics[key]}
+        self.bar.set_postfix({name: f"{value:.3g}" for name, value in self.shown.items()}, False)
+        self.bar.update(frames - self.done)
+        self.done = frames
+        if self.first is None:
+            self.first = (now, frames)
+        elif self.bar.disable and (
+            now - self.last_line >= _SECONDS_BETWEEN_LINES or frames >= self.total
+        ):
+            self.last_line = now
+            print(self._line(now), file=sys.stderr, flush=True)
+
+    def _line(self, now: float) -> str:
+        start, frames = self.first or (self.began, 0)
+        speed = (self.done - frames) / max(now - start, 1e-9)
+        left = (self.total - self.done) / max(speed, 1e-9)
+        shown = "  ".join(f"{name} {value:.3g}" for name, value in self.shown.items())
+        return (
+            f"{self.done:>9,} of {self.total:,} frames  {speed:,.0f} frames/s  "
+            f"{_clock(left)} left  {shown}"
+        )
+
+    def summary(self, metrics: dict[str, float], run_dir: Path) -> str:
+        """Sums the training up in a short table, with the next command to type."""
+        rows = {
+            "frames": f"{self.done:,}",
+            "time": _clock(time.monotonic() - self.began),
+            "coverage, last episodes": self._value("coverage"),
+            "interventions": self._value("interventions"),
+        }
+        if "eval/coverage" in metrics:
+            rows["coverage, test arenas"] = f"{metrics['eval/coverage']:.1%}"
+        width = max(map(len, rows))
+        table = "\n".join(f"  {name:<{width}}  {value}" for name, value in rows.items())
+        return f"{table}\n\nnext: forestrl eval checkpoint={run_dir}"
+
+    def _value(self, name: str) -> str:
+        return f"{self.shown[name]:.1%}" if name in self.shown else "no episode ended yet"
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
