@@ -98,8 +98,7 @@ def make_networks(cfg: DictConfig) -> ActorCritic:
 
 def architecture(cfg: DictConfig) -> dict[str, Any]:
     """Gives the part of the configuration that a policy file repeats."""
-    model = OmegaConf.to_container(cfg.model, resolve=True)
-    return {name: model[name] for name in _ARCHITECTURE}
+    return {name: cfg.model[name] for name in _ARCHITECTURE}
 
 
 def to_policy(cfg: DictConfig, networks: ActorCritic, training: dict[str, Any]) -> Policy:
@@ -159,7 +158,7 @@ def _make_wandb(cfg: DictConfig, run_dir: Path, logger_id: str | None) -> WandbL
     sweep = Path(job.sweep.dir) if job.mode is not None and job.mode.name == "MULTIRUN" else None
     overrides = list(job.overrides.task)
     folder = Path(cfg.logger.dir) if cfg.logger.dir else sweep or run_dir
-    config = OmegaConf.to_container(cfg, resolve=True)
+    config: Any = OmegaConf.to_container(cfg, resolve=True)
     return WandbLogger(
         folder,
         config,

@@ -6,7 +6,7 @@ room for frontier nodes.
 | key | symbol | shape, dtype | written by |
 |---|---|---|---|
 | ``("arena", "trees")`` | M | ``[*B, h, h]`` bool, hidden truth | ForestEnv |
-| ``("arena", "traversable")`` | denominator of rho | ``[*B, h, h]`` bool, hidden truth | ForestEnv |
+| ``("arena", "traversable")`` | under rho | ``[*B, h, h]`` bool, hidden truth | ForestEnv |
 | ``("map", "cells")`` | M^a_t | ``[*B, h, h]`` uint8, ``Cell`` | ForestEnv |
 | ``("agent", "position")`` | p^t | ``[*B, 2]`` int64 (row, col) | ForestEnv |
 | ``("exploration", "new_cells")`` | n^e_t | ``[*B, 1]`` float32 | ForestEnv |
@@ -15,7 +15,7 @@ room for frontier nodes.
 | ``"step_count"`` | n_s | ``[*B, 1]`` int64 | ForestEnv |
 | ``("safety", "feasible")`` | A^f and a^0 | ``[*B, 9]`` bool | SafetyFilter |
 | ``("safety", "executed")`` | u^sigma | ``[*B]`` int64, read under ``"next"`` | SafetyFilter |
-| ``("safety", "intervened")`` | u^pi != u^sigma | ``[*B, 1]`` bool, under ``"next"`` | SafetyFilter |
+| ``("safety", "intervened")`` | u^pi != u^sigma | ``[*B, 1]`` bool, as above | SafetyFilter |
 | ``("graph", "x")`` | x_v | ``[*B, 9 + M, 8]`` float32 | ExplorationGraph |
 | ``("graph", "waypoint")`` | v*_n (Eq. 2) | ``[*B, M]`` int64, 1 to 8 | ExplorationGraph |
 | ``("graph", "length")`` | its length / l | ``[*B, M]`` float32 | ExplorationGraph |

@@ -15,10 +15,17 @@ from forestrl.storage import atomic_write
 class Logger(Protocol):
     """What every logger does; ``step`` is counted in frames."""
 
-    def log_metrics(self, metrics: dict[str, float], step: int) -> None: ...
-    def log_figure(self, name: str, path: Path, step: int) -> None: ...
-    def log_policy(self, path: Path, aliases: Sequence[str]) -> None: ...
-    def close(self, failed: bool = False) -> None: ...
+    def log_metrics(self, metrics: dict[str, float], step: int) -> None:
+        """Takes scalars by name."""
+
+    def log_figure(self, name: str, path: Path, step: int) -> None:
+        """Takes a picture or an animation from a file."""
+
+    def log_policy(self, path: Path, aliases: Sequence[str]) -> None:
+        """Takes a policy file, to be found again by its aliases."""
+
+    def close(self, failed: bool = False) -> None:
+        """Ends the run."""
 
 
 class NoLogger:
@@ -108,7 +115,7 @@ class WandbLogger(NoLogger):
         import wandb
 
         self.wandb = wandb
-        mode = os.environ.get("WANDB_MODE") or ("online" if _logged_in() else "offline")
+        mode: Any = os.environ.get("WANDB_MODE") or ("online" if _logged_in() else "offline")
         folder.mkdir(parents=True, exist_ok=True)
         self.run = wandb.init(dir=str(folder), config=config, mode=mode, **settings)
         self.run.define_metric("frames")
@@ -127,7 +134,9 @@ class WandbLogger(NoLogger):
     def log_figure(self, name: str, path: Path, step: int) -> None:
         """Adds a picture or an animation."""
         animated = path.suffix == ".gif"
-        media = self.wandb.Video(str(path), format="gif") if animated else self.wandb.Image(str(path))
+        media = (
+            self.wandb.Video(str(path), format="gif") if animated else self.wandb.Image(str(path))
+        )
         self.run.log({"frames": step, name: media})
 
     def log_policy(self, path: Path, aliases: Sequence[str]) -> None:

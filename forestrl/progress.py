@@ -28,7 +28,11 @@ class Progress:
     def __init__(self, total: int, start: int = 0) -> None:
         self.total, self.done = total, start
         self.bar = tqdm(
-            total=total, initial=start, unit="frame", unit_scale=True, disable=not sys.stderr.isatty()
+            total=total,
+            initial=start,
+            unit="frame",
+            unit_scale=True,
+            disable=not sys.stderr.isatty(),
         )
         self.began = self.last_line = time.monotonic()
         self.first: tuple[float, int] | None = None  # the first update compiles: not counted

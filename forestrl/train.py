@@ -12,12 +12,12 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 from tensordict import TensorDictBase
-from torchrl.collectors import Collector
 
 from forestrl import build
 from forestrl.command import asked_for, command
 from forestrl.evaluation.episodes import evaluate
 from forestrl.evaluation.metrics import eval_metrics
+from forestrl.evaluation.picture import draw_episode
 from forestrl.learning.checkpoint import (
     load_training,
     restore_training,
@@ -27,6 +27,7 @@ from forestrl.learning.checkpoint import (
 from forestrl.learning.metrics import summarize
 from forestrl.policies.released import POLICY_FILE, save_policy
 from forestrl.progress import Progress
+
 
 class Training:
     """A training run: everything that lives from the first frame to the last.
@@ -103,6 +104,14 @@ class Training:
             self.save("best", logger)
         return metrics
 
+    def draw(self, logger: Any) -> None:
+        """Draws an episode in the first of the fixed arenas."""
+        cfg, path = self.cfg.eval, self.run_dir / "episode.gif"
+        env = build.make_env(self.cfg, num_envs=1)
+        steps = min(cfg.steps, 500)
+        draw_episode(env, self.policy, path, seed=cfg.seed, arena=0, steps=steps, every=5)
+        logger.log_figure("eval/episode", path, step=self.frames)
+
     def save(self, alias: str, logger: Any) -> None:
         """Writes the policy, and for the latest the training state beside it."""
         folder = self.run_dir / "checkpoints" / alias
@@ -136,7 +145,7 @@ def resumed(cfg: DictConfig) -> DictConfig:
     path = Path(cfg.resume) / ".hydra" / "config.yaml"
     if not path.is_file():
         raise FileNotFoundError(f"resume={cfg.resume} is not a run folder: {path} does not exist")
-    old = OmegaConf.load(path)
+    old = DictConfig(OmegaConf.load(path))
     for name in asked_for():
         OmegaConf.update(old, name, OmegaConf.select(cfg, name))
     return old
@@ -144,8 +153,10 @@ def resumed(cfg: DictConfig) -> DictConfig:
 
 @command("train")
 def main(cfg: DictConfig) -> float:
-    """Trains for ``cfg.total_frames``; returns the mean coverage of the last evaluation, or of the
-    last episodes if there is none, for sweepers."""
+    """Trains for ``cfg.total_frames``; returns the mean coverage for sweepers.
+
+    It is that of the last evaluation or, if there is none, of the last episodes.
+    """
     run_dir = Path(HydraConfig.get().runtime.output_dir)
     if cfg.resume is not None:
         run_dir, cfg = Path(cfg.resume), resumed(cfg)
@@ -160,6 +171,8 @@ def main(cfg: DictConfig) -> float:
     try:
         with Progress(training.total_frames, training.frames) as bar:
             metrics = training.run(logger, bar)
+        if cfg.eval.every > 0:
+            training.draw(logger)
         failed = False
     finally:
         training.collector.shutdown()

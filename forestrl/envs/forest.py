@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -72,8 +73,10 @@ class ForestEnv(EnvBase):
         _check("max_steps", max_steps, max_steps >= 1, "at least 1")
         _check("num_envs", num_envs, num_envs is None or num_envs >= 1, "at least 1")
         super().__init__(device=device, batch_size=[] if num_envs is None else [num_envs])
-        self.size, self.n_trees, self.tree_radius = size, n_trees, tuple(tree_radius)
+        self.size, self.n_trees = size, n_trees
+        self.tree_radius = (tree_radius[0], tree_radius[1])
         self.coverage_goal, self.max_steps = coverage_goal, max_steps
+        self.lidar_range = lidar_range
         lines = F.sight_lines(lidar_range)
         self.sight_lines = F.SightLines(*(part.to(self.device) for part in lines))
         self._make_specs()
@@ -202,15 +205,14 @@ def sample_arena(
     Raises:
         ValueError: if no forest with a free cell turns up.
     """
-    draw = {"size": env.size, "n_trees": env.n_trees, "tree_radius": env.tree_radius}
-    trees = F.sample_trees(batch, **draw, generator=generator)
+    draw = partial(F.sample_trees, size=env.size, n_trees=env.n_trees, tree_radius=env.tree_radius)
+    trees = draw(batch, generator=generator)
     for _ in range(_ATTEMPTS):
         full = trees.flatten(-2).all(-1)
         if not full.any():
             start = F.sample_position(kernels.largest_component(~trees), generator)
             return trees, start
-        again = F.sample_trees(batch, **draw, generator=generator)
-        trees = torch.where(full[..., None, None], again, trees)
+        trees = torch.where(full[..., None, None], draw(batch, generator=generator), trees)
     raise ValueError(
         f"n_trees={env.n_trees} of radius {list(env.tree_radius)} leaves no free cell in an arena "
         f"of size={env.size}: take fewer or thinner trees or a larger arena"

@@ -45,9 +45,7 @@ class StaggeredEpisodes(Transform):
         tensordict_reset[_HORIZON] = horizon
         return tensordict_reset
 
-    def _step(
-        self, tensordict: TensorDictBase, next_tensordict: TensorDictBase
-    ) -> TensorDictBase:
+    def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         horizon = tensordict[_HORIZON]
         cut = next_tensordict["truncated"] | (next_tensordict[K.STEP_COUNT] >= horizon)
         next_tensordict[_HORIZON] = horizon

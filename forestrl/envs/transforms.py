@@ -41,9 +41,7 @@ class SafetyFilter(Transform):
         tensordict[K.ACTION] = F.safe_action(proposed, feasible)
         return tensordict
 
-    def _step(
-        self, tensordict: TensorDictBase, next_tensordict: TensorDictBase
-    ) -> TensorDictBase:
+    def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         executed = tensordict[K.ACTION]  # u^sigma: this tensordict has been through _inv_call
         return self._report(next_tensordict, executed, executed != tensordict[K.PROPOSED])
 
@@ -88,9 +86,7 @@ class ExplorationGraph(Transform):
         ValueError: if ``window`` is even or not positive, or ``max_frontiers`` is less than 1.
     """
 
-    def __init__(
-        self, window: int = 7, max_frontiers: int = 256, lidar_range: float = 5.0
-    ) -> None:
+    def __init__(self, window: int = 7, max_frontiers: int = 256, lidar_range: float = 5.0) -> None:
         check_window(window)
         if max_frontiers < 1:
             raise ValueError(f"max_frontiers={max_frontiers} is not allowed: at least 1 is needed")
@@ -172,9 +168,7 @@ class FrontierPotentialReward(Transform):
         tensordict_reset[K.POTENTIAL] = self._potential(tensordict_reset)
         return tensordict_reset
 
-    def _step(
-        self, tensordict: TensorDictBase, next_tensordict: TensorDictBase
-    ) -> TensorDictBase:
+    def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         potential = tensordict.get(K.POTENTIAL, None)
         if potential is None:  # stepped from a situation that was written down, not reset
             potential = self._potential(tensordict)

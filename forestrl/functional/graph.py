@@ -126,7 +126,9 @@ def edges(
     node = torch.arange(WAYPOINTS, WAYPOINTS + room, device=device).expand(*batch, room)
     tied = torch.where(node - WAYPOINTS < frontiers, waypoint, node)
     fixed = WAYPOINT_EDGES.to(device)
-    span = (DISPLACEMENTS[WAYPOINT_EDGES[0]] - DISPLACEMENTS[WAYPOINT_EDGES[1]]).float().norm(dim=-1)
+    span = (
+        (DISPLACEMENTS[WAYPOINT_EDGES[0]] - DISPLACEMENTS[WAYPOINT_EDGES[1]]).float().norm(dim=-1)
+    )
     span = (span / lidar_range).to(device, length.dtype)
     loops = torch.arange(WAYPOINTS + room, device=device)
     same = torch.cat((fixed, loops.expand(2, -1)), -1).expand(*batch, 2, -1)

@@ -30,7 +30,7 @@ def inside(index: Tensor, size: tuple[int, int]) -> Tensor:
     return (row >= 0) & (row < size[0]) & (col >= 0) & (col < size[1])
 
 
-def gather(grid: Tensor, index: Tensor, outside: int | bool) -> Tensor:
+def gather(grid: Tensor, index: Tensor, outside: float) -> Tensor:
     """Reads cells, with a value for the cells outside the arena.
 
     Args:

@@ -41,8 +41,10 @@ def information_gain(cells: Tensor, window: int) -> Tensor:
 
 
 def potential(cells: Tensor, position: Tensor, *, window: int, beta: float) -> Tensor:
-    """Gives the frontier potential of a state (Eq. 9): the largest over its frontiers of
-    ``(-d + beta * gain + 1) / (1 + beta)``, with distance and gain scaled to [0, 1].
+    """Gives the frontier potential of a state (Eq. 9).
+
+    It is the largest of ``(-d + beta * gain + 1) / (1 + beta)`` over the frontiers, with distance
+    and gain scaled to [0, 1].
 
     Args:
         cells: the agent's map, uint8 ``[*B, H, W]``.
@@ -54,7 +56,8 @@ def potential(cells: Tensor, position: Tensor, *, window: int, beta: float) -> T
         ``Phi(s)``, float32 ``[*B, 1]`` in [0, 1]; 0 without frontiers.
     """
     gain = information_gain(cells, window)
-    value = (1 - distance(position, tuple(cells.shape[-2:])) + beta * gain) / (1 + beta)
+    height, width = cells.shape[-2:]
+    value = (1 - distance(position, (height, width)) + beta * gain) / (1 + beta)
     return (value * frontier(cells)).flatten(-2).amax(-1, keepdim=True)
 
 

@@ -66,7 +66,7 @@ def _sorted_frontier(frontier: np.ndarray, row: int, col: int, count: int) -> np
 
 
 @njit(cache=True, inline="always")
-def _nearest_waypoint(row: int, col: int) -> tuple[int, int]:
+def _nearest_waypoint(row: int, col: int) -> tuple[int, np.int64]:
     """Finds the waypoint (1 to 8) nearest to an offset from the agent, and the square distance."""
     best, best_square = 0, np.int64(1) << 40
     for i in range(1, WAYPOINTS):

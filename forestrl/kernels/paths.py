@@ -12,8 +12,10 @@ from forestrl.functional import gather
 
 @njit(cache=True)
 def _flood(free: np.ndarray, lengths: np.ndarray, row: int, col: int, queue: np.ndarray) -> int:
-    """Walks breadth-first from a cell; writes the number of moves to each cell where ``lengths``
-    is negative, lists the cells in ``queue`` and returns how many there are."""
+    """Walks breadth-first from a cell and returns how many cells it reached.
+
+    Writes the number of moves to each cell where ``lengths`` is negative; lists them in ``queue``.
+    """
     height, width = free.shape
     queue[0] = row * width + col
     lengths[row, col] = 0

@@ -105,13 +105,11 @@ class PPO:
         self.estimate_advantage(batch)
         self.minibatches.empty()
         self.minibatches.extend(batch.select(*_LEARNT_FROM).reshape(-1))
-        totals, steps = None, 0
+        measured = []
         for _ in range(self.num_epochs):
             for minibatch in self.minibatches:
-                measured = self._step(minibatch)
-                totals = measured if totals is None else totals + measured
-                steps += 1
-        means = (totals / steps).tolist()
+                measured.append(self._step(minibatch))
+        means = torch.stack(measured).mean(0).tolist()
         metrics = dict(zip(_MEASURED.values(), means, strict=True))
         return metrics | {"ppo/explained_variance": explained_variance(batch)}
 
@@ -123,7 +121,9 @@ class PPO:
         """
         time = batch.ndim - 1
         value = self._value(batch)
-        next_value = torch.cat((value.narrow(time, 1, value.shape[time] - 1), value[..., -1:, :]), time)
+        next_value = torch.cat(
+            (value.narrow(time, 1, value.shape[time] - 1), value[..., -1:, :]), time
+        )
         ends = batch["next", "done"].squeeze(-1).clone()
         ends[..., -1] = True
         next_value[ends] = self._value(batch["next"].select(*K.GRAPH)[ends])
@@ -155,6 +155,6 @@ _MEASURED = {
 
 
 def explained_variance(batch: TensorDictBase) -> float:
-    """Gives the share of the value targets' variance that the critic explained before the update."""
+    """Gives the share of the value targets' variance that the critic explained beforehand."""
     target, value = batch["value_target"], batch["state_value"]
     return float(1 - (target - value).var() / target.var().clamp_min(1e-8))

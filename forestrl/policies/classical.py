@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import torch
-from tensordict.nn import TensorDictModuleBase
 from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
 
 from forestrl import functional as F
 from forestrl import kernels

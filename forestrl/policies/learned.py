@@ -14,6 +14,8 @@ from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.policies.gatv2 import Critic, GATv2Encoder
 
+Kernel = Literal["fused", "pyg"]
+
 
 class ActorCritic(nn.Module):
     """The two networks of section 3, of the same shape and with their own weights.
@@ -31,7 +33,7 @@ class ActorCritic(nn.Module):
         hidden: int = 16,
         heads: int = 4,
         critic_readout: Literal["mean", "concat"] = "mean",
-        kernel: Literal["fused", "pyg"] = "fused",
+        kernel: Kernel = "fused",
         lidar_range: float = 5.0,
     ) -> None:
         super().__init__()

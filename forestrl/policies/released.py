@@ -16,7 +16,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from forestrl.policies.learned import ActorCritic
+from forestrl.policies.learned import ActorCritic, Kernel
 from forestrl.storage import atomic_write
 
 FORMAT = "forestrl-policy-1"
@@ -48,7 +48,7 @@ class Policy:
     training: dict[str, Any]
     weights: dict[str, torch.Tensor]
 
-    def build(self, kernel: str = "fused") -> ActorCritic:
+    def build(self, kernel: Kernel = "fused") -> ActorCritic:
         """Builds the networks with these weights."""
         networks = ActorCritic(**self.model, kernel=kernel)
         networks.load_state_dict(self.weights)
@@ -80,7 +80,7 @@ def load_policy(path: str | Path) -> Policy:
     try:
         with safe_open(path, framework="pt") as file:
             header = file.metadata() or {}
-            weights = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+            weights = {name: file.get_tensor(name) for name in file.keys()}
     except (SafetensorError, OSError) as error:
         raise CheckpointError(f"checkpoint={path} cannot be read as a policy: {error}") from error
     if header.get("format") != FORMAT:
@@ -97,7 +97,9 @@ def find_policy(path: Path) -> Path:
     if path.is_file():
         return path
     if not path.exists():
-        raise CheckpointError(f"checkpoint={path} does not exist: give a run folder or a policy file")
+        raise CheckpointError(
+            f"checkpoint={path} does not exist: give a run folder or a policy file"
+        )
     for folder in _IN_A_RUN:
         if (path / folder / POLICY_FILE).is_file():
             return path / folder / POLICY_FILE

@@ -1,0 +1,226 @@
+"""Whole-budget episodes on test arenas, kept as a few numbers a step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+from torchrl.envs import EnvBase
+
+from forestrl import functional as F
+from forestrl import keys as K
+from forestrl.evaluation.arenas import test_arenas, uniforms
+
+_NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
+
+
+class Curve(NamedTuple):
+    """Mean coverage by step and its 95 % interval over arenas, each float64 ``[steps + 1]``."""
+
+    mean: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """What happened in ``n`` arenas over ``steps`` steps each."""
+
+    index: NDArray[np.int64]
+    """Number of the arena, ``[n]``."""
+    coverage: NDArray[np.float32]
+    """``rho`` after each step, ``[n, steps + 1]``; column 0 is the scan before the first step."""
+    intervened: NDArray[np.bool_]
+    """Whether the safety filter replaced the action, ``[n, steps]``; False without a filter."""
+    collisions: NDArray[np.int32]
+    """Steps in which an infeasible action reached the world, ``[n]``."""
+    path_length: NDArray[np.float32]
+    """Length of the way that was gone, cells, ``[n]``: 1 or sqrt(2) a move."""
+    free_share: NDArray[np.float32]
+    """Share of *all* free cells, sealed pockets included, that is known at the end, ``[n]``."""
+    null_actions: NDArray[np.int32]
+    """Steps in which the executed action was to stay, ``[n]``."""
+    truncated_graphs: NDArray[np.int32]
+    """Observations with more frontier cells than the graph has room for, ``[n]``."""
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    @property
+    def steps(self) -> int:
+        """Steps of each episode."""
+        return self.intervened.shape[1]
+
+    def steps_to(self, level: float) -> NDArray[np.float64]:
+        """Gives the steps until coverage first reached a level: ``[n]``, nan where it never did."""
+        reached = self.coverage >= np.float32(level)
+        return np.where(reached.any(1), reached.argmax(1), np.nan)
+
+    def intervention_rate(self) -> NDArray[np.float64]:
+        """Gives the share of steps with an intervention, ``[n]``."""
+        return self.intervened.mean(1)
+
+    def area_under_curve(self, upto: int) -> NDArray[np.float64]:
+        """Gives the mean coverage over the first steps by the trapezoidal rule, ``[n]``.
+
+        Args:
+            upto: last step that counts.
+
+        Raises:
+            ValueError: if the episodes are shorter than that.
+        """
+        if not 1 <= upto <= self.steps:
+            raise ValueError(f"upto={upto} is not allowed: it must be 1 to {self.steps}")
+        coverage = self.coverage[:, : upto + 1].astype(np.float64)
+        return (coverage.sum(1) - (coverage[:, 0] + coverage[:, -1]) / 2) / upto
+
+    def mean_curve(self) -> Curve:
+        """Gives the mean coverage by step with a normal 95 % interval over arenas.
+
+        The interval is mean ± 1.96 standard errors, cut to [0, 1]; with one arena it is nan.
+        """
+        mean = self.coverage.mean(0, dtype=np.float64)
+        if len(self) == 1:
+            return Curve(mean, np.full_like(mean, np.nan), np.full_like(mean, np.nan))
+        margin = _NORMAL_95 * self.coverage.std(0, dtype=np.float64, ddof=1) / np.sqrt(len(self))
+        return Curve(mean, np.maximum(mean - margin, 0.0), np.minimum(mean + margin, 1.0))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Episodes]) -> Episodes:
+        """Joins episodes of equal length, in order.
+
+        Raises:
+            ValueError: if there are none or their lengths differ.
+        """
+        if len({part.steps for part in parts}) != 1:
+            raise ValueError(f"episodes of one length are needed, got {[p.steps for p in parts]}")
+        columns = ([getattr(part, field.name) for part in parts] for field in fields(cls))
+        return cls(*(np.concatenate(column) for column in columns))
+
+
+def evaluate(
+    env_factory: Callable[[int], EnvBase],
+    policy: Callable[[TensorDictBase], TensorDictBase],
+    *,
+    seed: int,
+    indices: Sequence[int],
+    steps: int,
+    batch: int,
+    progress: Callable[[int], object] | None = None,
+) -> Episodes:
+    """Runs a policy on test arenas for the whole budget, past the coverage goal.
+
+    What happens in an arena depends on the seed and its number, not on the arenas beside it. Before
+    every call of the policy ``"uniform"`` holds a fresh draw for each arena.
+
+    Args:
+        env_factory: makes a forest with its transforms for a number of arenas.
+        policy: writes ``"action"``.
+        seed: seed of the whole evaluation.
+        indices: numbers of the arenas.
+        steps: steps of each episode.
+        batch: arenas stepped at once.
+        progress: told, after every step, how many steps are done, counted over all arenas.
+
+    Returns:
+        the episodes, in the order of ``indices``.
+
+    Raises:
+        ValueError: if there is nothing to run.
+    """
+    for name, value in (("len(indices)", len(indices)), ("steps", steps), ("batch", batch)):
+        if value < 1:
+            raise ValueError(f"{name}={value} is not allowed: at least 1 is needed")
+    chunks = [indices[first : first + batch] for first in range(0, len(indices), batch)]
+    env, parts, done = env_factory(len(chunks[0])), [], 0
+    for chunk in chunks:
+        if env.batch_size != (len(chunk),):
+            env = env_factory(len(chunk))
+
+        def tell(step: int, done: int = done, size: int = len(chunk)) -> None:
+            if progress is not None:
+                progress(done + step * size)
+
+        parts.append(_run(env, policy, seed=seed, indices=chunk, steps=steps, tell=tell))
+        done += len(chunk) * steps
+    return Episodes.concatenate(parts)
+
+
+@torch.no_grad()
+def _run(
+    env: EnvBase,
+    policy: Callable[[TensorDictBase], TensorDictBase],
+    *,
+    seed: int,
+    indices: Sequence[int],
+    steps: int,
+    tell: Callable[[int], None],
+) -> Episodes:
+    """Runs all arenas of one env at once."""
+    draws = uniforms(seed, indices, steps).to(env.device).T.contiguous()  # (steps, n)
+    td = env.reset(test_arenas(env, seed, indices))
+    record = _Record(td, steps)
+    for step in range(steps):
+        td = policy(td.set(K.UNIFORM, draws[step]))
+        td = env.step(td)
+        record.add(step, td)
+        td = env.step_mdp(td)
+        tell(step + 1)
+    return record.episodes(np.asarray(indices, dtype=np.int64), td)
+
+
+class _Record:
+    """Collects what the episodes keep: a few numbers a step, never a map."""
+
+    def __init__(self, td: TensorDictBase, steps: int) -> None:
+        n, device = td.batch_size[0], td.device
+        self.coverage = torch.zeros(steps + 1, n, device=device)
+        self.coverage[0] = td[K.COVERAGE].squeeze(-1)
+        self.intervened = torch.zeros(steps, n, dtype=torch.bool, device=device)
+        self.counts = TensorDict(
+            {
+                name: torch.zeros(n, dtype=torch.int32, device=device)
+                for name in ("collisions", "straight", "diagonal", "null_actions", "truncated")
+            }
+        )
+
+    def add(self, step: int, td: TensorDictBase) -> None:
+        """Takes note of one step: the state, the action and, under ``"next"``, what it led to."""
+        after, counts = td["next"], self.counts
+        self.coverage[step + 1] = after[K.COVERAGE].squeeze(-1)
+        if (intervened := after.get(K.INTERVENED, None)) is not None:
+            self.intervened[step] = intervened.squeeze(-1)
+        executed = after.get(K.EXECUTED, None)
+        moved = (after[K.POSITION] - td[K.POSITION]).abs().sum(-1)  # 0, 1, or 2 on a diagonal
+        counts["collisions"] += after[K.COLLISION].squeeze(-1)
+        counts["straight"] += moved == 1
+        counts["diagonal"] += moved == 2
+        counts["null_actions"] += (td[K.ACTION] if executed is None else executed) == F.NULL_ACTION
+        if (frontiers := td.get(K.FRONTIERS, None)) is not None:
+            counts["truncated"] += frontiers.squeeze(-1) > td[K.WAYPOINT].shape[-1]
+
+    def episodes(self, index: NDArray[np.int64], last: TensorDictBase) -> Episodes:
+        """Gives the record as arrays; ``last`` is the state after the last step."""
+        free = ~last[K.TREES]
+        known = (free & (last[K.CELLS] == F.Cell.FREE)).sum((-2, -1))
+        length = self.counts["straight"] + 2**0.5 * self.counts["diagonal"]
+        return Episodes(
+            index=index,
+            coverage=_array(self.coverage.T),
+            intervened=_array(self.intervened.T),
+            collisions=_array(self.counts["collisions"]),
+            path_length=_array(length),
+            free_share=_array(known / free.sum((-2, -1))),
+            null_actions=_array(self.counts["null_actions"]),
+            truncated_graphs=_array(self.counts["truncated"]),
+        )
+
+
+def _array(tensor: Tensor) -> NDArray:
+    return tensor.contiguous().cpu().numpy()

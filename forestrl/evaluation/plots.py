@@ -1,0 +1,128 @@
+"""The two pictures of an evaluation, with the paper's own numbers marked."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from forestrl.evaluation.episodes import Episodes
+
+PAPER_COVERAGE = {1000: 0.80, 2000: 0.95, 2500: 0.97}
+"""Fig. 3b: mean coverage by step; h = 50, 45 trunks."""
+PAPER_INTERVENTION_RATE = 0.10
+"""Fig. 3c: mean share of steps with an intervention."""
+PAPER_SHARE_UNDER_LIMIT = 0.80
+INTERVENTION_LIMIT = 0.15
+"""Fig. 3c: 80 % of the runs have fewer interventions than this."""
+
+_SIZE, _DPI = (6.4, 4.0), 150  # inches, dots per inch: 960 x 600 pixels
+_OURS, _THEIRS = "#0072B2", "black"  # a mid grey and black in print
+_BARS = "#7FB8D8"
+_BIN = 0.025
+_LEGEND_TOP = 0.35  # of the height of the axes
+
+
+def coverage_png(episodes: Episodes, *, title: str, paper: bool = True) -> bytes:
+    """Draws the mean coverage against steps (Fig. 3b).
+
+    Args:
+        episodes: what to draw.
+        title: stands above the picture.
+        paper: whether the paper's numbers are marked.
+
+    Returns:
+        a PNG file.
+    """
+    axes = _axes(title, "steps", "coverage of the traversable cells (%)")
+    steps, curve = np.arange(episodes.steps + 1), episodes.mean_curve()
+    low, high = np.quantile(episodes.coverage, [0.1, 0.9], axis=0)
+    axes.fill_between(
+        steps, 100 * low, 100 * high, color=_OURS, alpha=0.18, lw=0, label="middle 80 % of arenas"
+    )
+    if len(episodes) > 1:
+        axes.fill_between(
+            steps,
+            100 * curve.low,
+            100 * curve.high,
+            color=_OURS,
+            alpha=0.45,
+            lw=0,
+            label="95 % interval of the mean",
+        )
+    axes.plot(steps, 100 * curve.mean, color=_OURS, lw=1.8, label=f"mean of {_arenas(episodes)}")
+    marks = {step: level for step, level in PAPER_COVERAGE.items() if step <= episodes.steps}
+    if paper and marks:
+        axes.plot(
+            list(marks),
+            [100 * level for level in marks.values()],
+            ls="none",
+            marker="D",
+            ms=6,
+            mfc="white",
+            mec=_THEIRS,
+            label="paper (Fig. 3b)",
+            clip_on=False,
+            zorder=5,
+        )
+    axes.set(xlim=(0, episodes.steps), ylim=(0, 100))
+    axes.legend(loc="lower right" if low[-1] > _LEGEND_TOP else "upper left", frameon=False)
+    return _png(axes)
+
+
+def interventions_png(episodes: Episodes, *, title: str, paper: bool = True) -> bytes:
+    """Draws how the share of steps with an intervention is distributed (Fig. 3c).
+
+    Args:
+        episodes: what to draw.
+        title: stands above the picture.
+        paper: whether the paper's numbers are marked.
+
+    Returns:
+        a PNG file.
+    """
+    axes = _axes(title, "steps with an intervention (%)", "runs (%)")
+    rate = episodes.intervention_rate()
+    end = max(0.3, _BIN * np.ceil((rate.max() + 1e-9) / _BIN))
+    edges = np.arange(0, end + _BIN / 2, _BIN)
+    weight = np.full(len(rate), 100 / len(rate))
+    axes.hist(100 * rate, (100 * edges).tolist(), weights=weight, color=_BARS, ec="white", lw=0.8)
+    axes.axvline(100 * rate.mean(), color=_OURS, lw=2.2, label=f"mean: {100 * rate.mean():.1f} %")
+    if paper:
+        label = f"paper's mean: {100 * PAPER_INTERVENTION_RATE:.0f} %"
+        axes.axvline(100 * PAPER_INTERVENTION_RATE, color=_THEIRS, lw=1.4, ls="--", label=label)
+    share = (rate < INTERVENTION_LIMIT).mean()
+    label = f"{100 * INTERVENTION_LIMIT:.0f} %: {100 * share:.0f} % of runs lie below"
+    if paper:
+        label += f" (paper: {100 * PAPER_SHARE_UNDER_LIMIT:.0f} %)"
+    axes.axvline(100 * INTERVENTION_LIMIT, color=_THEIRS, lw=1.4, ls=":", label=label)
+    axes.set_xlim(0, 100 * end)
+    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])  # room for the legend
+    axes.set_yticks([tick for tick in axes.get_yticks() if tick <= 100])
+    axes.legend(loc="upper right", frameon=False)
+    return _png(axes)
+
+
+def _arenas(episodes: Episodes) -> str:
+    return "1 arena" if len(episodes) == 1 else f"{len(episodes)} arenas"
+
+
+def _axes(title: str, xlabel: str, ylabel: str) -> Axes:
+    figure = Figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set_title(title, fontsize=11)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis="y", color="0.88", lw=0.8)
+    axes.set_axisbelow(True)
+    return axes
+
+
+def _png(axes: Axes) -> bytes:
+    buffer = io.BytesIO()
+    axes.figure.canvas.print_figure(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()

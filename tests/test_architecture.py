@@ -1,0 +1,100 @@
+"""Imports point downwards only."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
+
+L0 = {"functional", "kernels"}
+L1 = {"keys", "storage", "progress"}
+L2 = {"envs", "policies", "learning", "planner"}
+STUDIES = {"evaluation", "rendering"}
+L3 = {"config", "command", "loggers", "build"}
+L4 = {"train", "eval", "render", "bench", "figures", "export"}
+ROOMS = {  # room: the other rooms it may import from
+    "": set(),
+    "functional": set(),
+    "kernels": {"functional"},
+    **{name: set() for name in L1},
+    **dict.fromkeys(L2, L0 | L1),
+    "planner": L0 | L1 | {"policies"},
+    **dict.fromkeys(STUDIES, L0 | L1 | {"envs"}),
+    "config": set(),
+    "command": {"config"},
+    "loggers": {"storage"},
+    "build": L0 | L1 | L2 | STUDIES | {"config", "loggers"},
+    **dict.fromkeys(L4, L0 | L1 | L2 | STUDIES | L3),
+    "cli": {""},
+}
+LIBRARIES = {  # the only libraries of these rooms, besides Python's own
+    "": set(),
+    "functional": {"torch"},
+    "kernels": {"torch", "numba", "llvmlite", "numpy"},
+    "keys": {"torch", "tensordict"},
+    "storage": set(),
+    "progress": {"tqdm"},
+    "cli": set(),
+}
+FUNCTIONAL = [  # each row may import from the rows above it
+    {"grid"},
+    {"actions", "arena", "lidar"},
+    {"frontier"},
+    {"graph", "paths", "reward"},
+    {"__init__"},
+]
+
+
+def imports(path):
+    """The dotted names that a module imports, wherever in the file it does so."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: imports are absolute"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def room(name):
+    """``forestrl.envs.forest.ForestEnv`` is in ``envs``; ``forestrl.__version__`` in none."""
+    return (part := name.split(".")[1]) * (part in ROOMS)
+
+
+@pytest.fixture(params=MODULES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def module(request):
+    path = request.param
+    home = path.relative_to(ROOT / "forestrl").with_suffix("").parts[0].replace("__init__", "")
+    names = set(imports(path))
+    ours = {name for name in names if name.startswith("forestrl.")}
+    return path, home, ours, {name.split(".")[0] for name in names - ours}
+
+
+def test_every_module_is_in_a_room(module):
+    assert module[1] in ROOMS
+
+
+def test_rooms_import_from_the_rooms_below(module):
+    _, home, ours, _ = module
+    assert {room(name) for name in ours} <= ROOMS[home] | {home}
+
+
+def test_rooms_import_their_libraries_only(module):
+    _, home, _, libraries = module
+    libraries -= sys.stdlib_module_names
+    assert libraries <= LIBRARIES.get(home, libraries)
+
+
+def test_nothing_below_the_assembler_knows_hydra_or_wandb(module):
+    _, home, _, libraries = module
+    assert home not in L0 | L1 | L2 | STUDIES or not libraries & {"hydra", "omegaconf", "wandb"}
+
+
+def test_functional_modules_are_in_order(module):
+    path, home, ours, _ = module
+    if home == "functional":
+        (row,) = (i for i, names in enumerate(FUNCTIONAL) if path.stem in names)
+        allowed = set().union(*FUNCTIONAL[:row])
+        assert {name.split(".")[2] for name in ours} <= allowed
