@@ -29,8 +29,7 @@ class ConfigError(ValueError):
 
 def prepare(cfg: DictConfig) -> None:
     """Sets threads and checks the device, before anything is built."""
-    if cfg.threads < 1:
-        raise ConfigError(f"threads={cfg.threads} is not allowed: at least 1 is needed")
+    require_positive(cfg, "threads")
     torch.set_num_threads(cfg.threads)
     numba.set_num_threads(min(cfg.threads, numba.config.NUMBA_NUM_THREADS))
     try:
@@ -40,6 +39,13 @@ def prepare(cfg: DictConfig) -> None:
         raise ConfigError(
             f"device={cfg.device} is not there: this machine has {', '.join(there)}"
         ) from error
+
+
+def require_positive(cfg: DictConfig, *names: str) -> None:
+    """Refuses settings less than 1."""
+    for name in names:
+        if (value := OmegaConf.select(cfg, name)) < 1:
+            raise ConfigError(f"{name}={value} is not allowed: at least 1 is needed")
 
 
 def make_output_folder(folder: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
@@ -10,15 +11,19 @@ from functools import wraps
 from typing import Any
 
 import hydra
+from hydra import compose
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException, InstantiationException
 from hydra.types import RunMode
-from omegaconf import DictConfig
+from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from forestrl.config import CONF_DIR
 
 _USER_ERRORS = (ValueError, OSError, HydraException, OmegaConfBaseException)
+_SWEEP_FLAGS = ("-m", "--multirun")
+_KINDS = {int: "a whole number", float: "a number", bool: "true or false", ListConfig: "a list"}
+_FULL_ERROR = os.environ.get("HYDRA_FULL_ERROR") == "1"  # as the user set it; main() sets it too
 
 
 def command(name: str) -> Callable[[Callable[[DictConfig], Any]], Callable[[], Any]]:
@@ -36,6 +41,7 @@ def command(name: str) -> Callable[[Callable[[DictConfig], Any]], Callable[[], A
         @wraps(function)
         def job(cfg: DictConfig) -> Any:
             try:
+                _check_kinds(cfg)
                 return function(cfg)
             except _USER_ERRORS as error:
                 if _debug() or HydraConfig.get().mode == RunMode.MULTIRUN:
@@ -46,13 +52,14 @@ def command(name: str) -> Callable[[Callable[[DictConfig], Any]], Callable[[], A
 
         @wraps(function)
         def main() -> Any:
-            if _debug():
-                os.environ["HYDRA_FULL_ERROR"] = "1"
-                return entry()
+            # Hydra takes all settings before the flag or all after it, not some of each
+            sys.argv[1:] = sorted(sys.argv[1:], key=lambda word: word not in _SWEEP_FLAGS)
             os.environ["HYDRA_FULL_ERROR"] = "1"  # errors reach the line below instead of a print
             try:
                 return entry()
             except _USER_ERRORS as error:
+                if _debug():
+                    raise
                 _fail(name, error)
             finally:
                 del os.environ["HYDRA_FULL_ERROR"]
@@ -64,13 +71,36 @@ def command(name: str) -> Callable[[Callable[[DictConfig], Any]], Callable[[], A
 
 def asked_for() -> set[str]:
     """Names the settings given on the command line or by the sweep, without their values."""
-    overrides = HydraConfig.get().overrides.task
-    return {override.lstrip("+~").partition("=")[0] for override in overrides}
+    return {_setting(override) for override in HydraConfig.get().overrides.task}
+
+
+def _setting(override: str) -> str:
+    return override.lstrip("+~").partition("=")[0]
+
+
+def _check_kinds(cfg: DictConfig) -> None:
+    """Refuses a setting of another kind than its default's, such as ``env.size=large``."""
+    job = HydraConfig.get()
+    groups = [text for text in job.overrides.task if _setting(text) in job.runtime.choices]
+    defaults = compose(job.job.config_name, groups)
+    for name in sorted(asked_for()):
+        given, default = OmegaConf.select(cfg, name), OmegaConf.select(defaults, name)
+        if not _same_kind(given, default):
+            kind = _KINDS[type(default)]
+            raise ValueError(f"{name}={given} is not allowed: it must be {kind}, such as {default}")
+
+
+def _same_kind(given: Any, default: Any) -> bool:
+    if isinstance(default, ListConfig):
+        alike = isinstance(given, ListConfig) and len(given) == len(default)
+        return alike and all(map(_same_kind, given, default))
+    if isinstance(default, float):
+        return type(given) in (int, float) and math.isfinite(given)
+    return type(default) not in _KINDS or type(given) is type(default)
 
 
 def _debug() -> bool:
-    given = os.environ.get("HYDRA_FULL_ERROR") == "1"
-    return given or any(argument.lower() == "debug=true" for argument in sys.argv)
+    return _FULL_ERROR or any(argument.lower() == "debug=true" for argument in sys.argv)
 
 
 def _fail(name: str, error: BaseException) -> None:
@@ -83,7 +113,7 @@ def describe(error: BaseException) -> str:
     """Puts an error into one line, from its first cause."""
     while isinstance(error, InstantiationException) and error.__cause__ is not None:
         error = error.__cause__
-    text = " ".join(str(error).split())
+    text = " ".join(str(error).split()).partition(" Config search path:")[0]
     if unknown := re.search(r"Could not override '([^']+)'", text):
         return f"there is no setting '{unknown[1]}': see `--cfg job` for all settings"
     return text

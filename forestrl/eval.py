@@ -23,9 +23,7 @@ PAPER_ARENA = {"size": 50, "n_trees": 45}
 def run(cfg: DictConfig, policy: Any) -> Episodes:
     """Runs a policy on the test arenas of a configuration, with a bar in steps of all arenas."""
     settings = cfg.eval
-    for name in ("arenas", "steps", "batch"):
-        if settings[name] < 1:
-            raise build.ConfigError(f"eval.{name}={settings[name]} is not allowed: at least 1")
+    build.require_positive(cfg, "eval.arenas", "eval.steps", "eval.batch")
     bar = tqdm(
         total=settings.arenas * settings.steps,
         unit="step",

@@ -20,9 +20,7 @@ def main(cfg: DictConfig) -> None:
     build.make_output_folder(folder)
     policy, _ = build.make_policy(cfg, asked_for())
     settings = cfg.render
-    for name in ("steps", "every", "fps", "scale"):
-        if settings[name] < 1:
-            raise build.ConfigError(f"render.{name}={settings[name]} is not allowed: at least 1")
+    build.require_positive(cfg, "render.steps", "render.every", "render.fps", "render.scale")
     draw_episode(
         build.make_env(cfg, num_envs=1),
         policy,

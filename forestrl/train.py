@@ -155,12 +155,14 @@ def resumed(cfg: DictConfig) -> DictConfig:
 def main(cfg: DictConfig) -> float:
     """Trains for ``cfg.total_frames``; returns the mean coverage for sweepers.
 
-    It is that of the last evaluation or, if there is none, of the last episodes.
+    It is that of the last evaluation or, if there is none, of the last episodes; nan if there was
+    nothing left to train.
     """
     run_dir = Path(HydraConfig.get().runtime.output_dir)
     if cfg.resume is not None:
         run_dir, cfg = Path(cfg.resume), resumed(cfg)
     build.prepare(cfg)
+    build.require_positive(cfg, "total_frames", "eval.arenas", "eval.steps")
     build.make_output_folder(run_dir)
     training = Training(cfg, run_dir)
     if cfg.resume is not None:
@@ -178,7 +180,7 @@ def main(cfg: DictConfig) -> float:
         training.collector.shutdown()
         logger.close(failed)
     print(bar.summary(metrics, run_dir))
-    return metrics.get("eval/coverage", metrics["rollout/coverage"])
+    return metrics.get("eval/coverage", metrics.get("rollout/coverage", float("nan")))
 
 
 if __name__ == "__main__":

@@ -22,12 +22,13 @@ ROOMS = {  # room: the other rooms it may import from
     **{name: set() for name in L1},
     **dict.fromkeys(L2, L0 | L1),
     "planner": L0 | L1 | {"policies"},
-    **dict.fromkeys(STUDIES, L0 | L1 | {"envs"}),
+    "rendering": L0 | L1 | {"envs"},
+    "evaluation": L0 | L1 | {"envs", "rendering"},
     "config": set(),
     "command": {"config"},
     "loggers": {"storage"},
     "build": L0 | L1 | L2 | STUDIES | {"config", "loggers"},
-    **dict.fromkeys(L4, L0 | L1 | L2 | STUDIES | L3),
+    **dict.fromkeys(L4, {""} | L0 | L1 | L2 | STUDIES | L3),
     "cli": {""},
 }
 LIBRARIES = {  # the only libraries of these rooms, besides Python's own

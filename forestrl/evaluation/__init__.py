@@ -1,6 +1,6 @@
 """Evaluation on fixed test arenas: drawing them, running policies on them, reporting."""
 
-from forestrl.evaluation.arenas import test_arenas, test_generator, uniforms
+from forestrl.evaluation.arenas import arena_generator, draw_arenas, uniforms
 from forestrl.evaluation.episodes import Curve, Episodes, evaluate
 
-__all__ = ["Curve", "Episodes", "evaluate", "test_arenas", "test_generator", "uniforms"]
+__all__ = ["Curve", "Episodes", "arena_generator", "draw_arenas", "evaluate", "uniforms"]

@@ -14,7 +14,7 @@ from forestrl import keys as K
 from forestrl.envs import sample_arena
 
 
-def test_generator(seed: int, index: int, stream: str) -> torch.Generator:
+def arena_generator(seed: int, index: int, stream: str) -> torch.Generator:
     """Makes the CPU generator of one arena and one purpose.
 
     Args:
@@ -26,14 +26,14 @@ def test_generator(seed: int, index: int, stream: str) -> torch.Generator:
         a generator with a 64-bit seed that is a hash of all three.
 
     Examples:
-        >>> test_generator(0, 7, "arena").initial_seed() == test_generator(0, 7, "x").initial_seed()
+        >>> arena_generator(0, 7, "arena").initial_seed() == arena_generator(0, 7, "x").initial_seed()
         False
     """
     digest = hashlib.sha256(f"{seed}/{index}/{stream}".encode()).digest()
     return torch.Generator().manual_seed(int.from_bytes(digest[:8], "little"))
 
 
-def test_arenas(env: EnvBase, seed: int, indices: Sequence[int]) -> TensorDict:
+def draw_arenas(env: EnvBase, seed: int, indices: Sequence[int]) -> TensorDict:
     """Draws test arenas as ``env.reset`` takes them.
 
     Args:
@@ -45,7 +45,7 @@ def test_arenas(env: EnvBase, seed: int, indices: Sequence[int]) -> TensorDict:
         ``("arena", "trees")`` bool ``[n, h, h]`` and ``("agent", "position")`` int64 ``[n, 2]``.
     """
     forest = getattr(env, "base_env", env)
-    worlds = [sample_arena(forest, generator=test_generator(seed, i, "arena")) for i in indices]
+    worlds = [sample_arena(forest, generator=arena_generator(seed, i, "arena")) for i in indices]
     trees, position = (torch.stack(parts) for parts in zip(*worlds, strict=True))
     arenas = TensorDict({K.TREES: trees, K.POSITION: position}, batch_size=[len(worlds)])
     return arenas.to(forest.device)
@@ -62,5 +62,5 @@ def uniforms(seed: int, indices: Sequence[int], steps: int) -> Tensor:
     Returns:
         float32 ``[n, steps]``, uniform in [0, 1).
     """
-    rows = [torch.rand(steps, generator=test_generator(seed, i, "actions")) for i in indices]
+    rows = [torch.rand(steps, generator=arena_generator(seed, i, "actions")) for i in indices]
     return torch.stack(rows)

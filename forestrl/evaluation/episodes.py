@@ -15,7 +15,7 @@ from torchrl.envs import EnvBase
 
 from forestrl import functional as F
 from forestrl import keys as K
-from forestrl.evaluation.arenas import test_arenas, uniforms
+from forestrl.evaluation.arenas import draw_arenas, uniforms
 
 _NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
@@ -164,7 +164,7 @@ def _run(
 ) -> Episodes:
     """Runs all arenas of one env at once."""
     draws = uniforms(seed, indices, steps).to(env.device).T.contiguous()  # (steps, n)
-    td = env.reset(test_arenas(env, seed, indices))
+    td = env.reset(draw_arenas(env, seed, indices))
     record = _Record(td, steps)
     for step in range(steps):
         td = policy(td.set(K.UNIFORM, draws[step]))

@@ -44,7 +44,7 @@ def draw_episode(
     pictures = record_episode(
         env,
         policy,
-        arenas.test_arenas(env, seed, [arena]),
+        arenas.draw_arenas(env, seed, [arena]),
         steps,
         every,
         uniforms=arenas.uniforms(seed, [arena], steps),

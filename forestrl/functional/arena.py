@@ -82,7 +82,7 @@ def component(free: Tensor, position: Tensor) -> Tensor:
     Returns:
         bool ``[*B, H, W]``.
     """
-    reached = torch.zeros_like(free)
+    reached = torch.zeros_like(free, memory_format=torch.contiguous_format)
     flat = (position[..., 0] * free.shape[-1] + position[..., 1]).unsqueeze(-1)
     reached.flatten(-2).scatter_(-1, flat, True)
     reached &= free

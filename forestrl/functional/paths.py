@@ -20,7 +20,7 @@ def path_lengths(free: Tensor, source: Tensor) -> Tensor:
     Returns:
         float32 ``[*B, H, W]``, in moves; infinite where no path leads.
     """
-    reached = torch.zeros_like(free)
+    reached = torch.zeros_like(free, memory_format=torch.contiguous_format)
     flat = (source[..., 0] * free.shape[-1] + source[..., 1]).unsqueeze(-1)
     reached.flatten(-2).scatter_(-1, flat, True)
     lengths = torch.full(free.shape, torch.inf, device=free.device).masked_fill(reached, 0.0)

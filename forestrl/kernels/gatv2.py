@@ -148,6 +148,12 @@ def _leaky(z, slope):
 
 
 @njit(cache=True)
+def _relu(y):
+    """ReLU that keeps NaN, so that broken weights show in the logits."""
+    return where_positive(-1 * y, 0, y)
+
+
+@njit(cache=True)
 def _attend(links, edges, p, slope, a, shape):
     """Scores, softmax and weighted sums at the core nodes (Eqs. 3 to 5)."""
     lanes, heads, hidden = shape
@@ -232,7 +238,7 @@ def _encode(x, nodes, net, s, shapes):
     att, edge, bias = load(p, _ATT, lanes), load(p, _EDGE, lanes), load(p, _BIAS, lanes)
     for i in range(WAYPOINTS):
         y = load(a.mixed, i, lanes) + bias
-        store(s.hidden, i, where_positive(y, y, 0))
+        store(s.hidden, i, _relu(y))
     for e in range(_CORE_EDGES, edges):  # a frontier attends to itself and to its waypoint
         i, w, reach = s.links.source[e], s.links.target[e], s.links.span[e] * edge
         left, right, other = load(a.left, i, lanes), load(a.right, i, lanes), load(a.left, w, lanes)
@@ -240,7 +246,7 @@ def _encode(x, nodes, net, s, shapes):
         gate = 1 / (1 + exp(group_sums(att * (own - back), shapes[0][1])))
         store(s.gate, i, gate)
         y = left + spread(gate, hidden) * (other - left) + bias
-        store(s.hidden, i, where_positive(y, y, 0))
+        store(s.hidden, i, _relu(y))
     left2, right2 = load(p, _LEFT2, lanes), load(p, _RIGHT2, lanes)
     bias_left, bias_right = load(net.scalars, _LEFT_BIAS, one), load(net.scalars, _RIGHT_BIAS, one)
     for i in range(nodes):

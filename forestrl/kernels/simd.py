@@ -15,6 +15,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.extending import intrinsic, models, overload, register_model
 
 _INT = ir.IntType(32)
@@ -106,9 +107,16 @@ def _address(context: Any, builder: Any, signature: Any, args: Any, vector: Vect
     return builder.bitcast(start, context.get_value_type(vector).as_pointer())
 
 
+def _require_rows(array: types.Array) -> None:
+    if array.ndim != 2 or array.layout != "C":
+        msg = f"rows are taken from C-contiguous matrices, not from {array}"
+        raise TypingError(msg)
+
+
 @intrinsic
 def load(typing_context, array, row, lanes) -> tuple:
     """``load(array, row, lanes)``: the row of a C-contiguous matrix with ``len(lanes)`` columns."""
+    _require_rows(array)
     vector = Vector(array.dtype, lanes.count)
 
     def build(context, builder, signature, args):
@@ -123,6 +131,7 @@ def load(typing_context, array, row, lanes) -> tuple:
 @intrinsic
 def store(typing_context, array, row, vector) -> tuple:
     """``store(array, row, vector)``: writes a row of a C-contiguous matrix."""
+    _require_rows(array)
 
     def build(context, builder, signature, args):
         address = _address(context, builder, signature, args, vector)

@@ -57,14 +57,21 @@ class PPO:
         entropy_coeff: float = 0.0,
         max_grad_norm: float = 0.5,
     ) -> None:
+        positive = {
+            "frames_per_batch": frames_per_batch,
+            "num_epochs": num_epochs,
+            "lr": lr,
+            "clip_epsilon": clip_epsilon,
+            "max_grad_norm": max_grad_norm,
+        }
+        for name, value in positive.items():
+            if value <= 0:
+                raise ValueError(f"{name}={value} is not allowed: it must be more than 0")
         if num_minibatches < 1 or frames_per_batch % num_minibatches:
             raise ValueError(
                 f"num_minibatches={num_minibatches} is not allowed: it must divide "
                 f"frames_per_batch={frames_per_batch}"
             )
-        for name, value in (("num_epochs", num_epochs), ("lr", lr), ("clip_epsilon", clip_epsilon)):
-            if value <= 0:
-                raise ValueError(f"{name}={value} is not allowed: it must be more than 0")
         for name, value in (("gamma", gamma), ("gae_lambda", gae_lambda)):
             if not 0 <= value <= 1:
                 raise ValueError(f"{name}={value} is not allowed: it must be in [0, 1]")

@@ -73,6 +73,14 @@ def test_algorithm_1_in_a_drawn_world():
     assert after[K.FEASIBLE].tolist() == [i in (0, 4, 5) for i in range(9)]
 
 
+def test_algorithm_1_reads_the_agents_map_and_not_the_hidden_truth():
+    env, td = env_for(CORRIDOR, SafetyFilter())
+    td[K.CELLS][0, 1] = int(F.Cell.UNKNOWN)  # free in truth, but the agent does not know
+    after = step(env, td, 5)
+    assert after[K.EXECUTED] == 0 and after[K.INTERVENED].tolist() == [True]
+    assert after[K.POSITION].tolist() == [0, 0]
+
+
 def test_algorithm_1_waits_when_boxed_in():
     env, td = env_for("T T T\nT A T\nT T T", SafetyFilter())
     after = step(env, td, 3)

@@ -10,7 +10,7 @@ from torchrl.envs import TransformedEnv
 from forestrl import keys as K
 from forestrl.envs import ExplorationGraph, ForestEnv
 from forestrl.evaluation import Episodes, evaluate, uniforms
-from forestrl.evaluation.arenas import test_arenas as arenas_of
+from forestrl.evaluation.arenas import draw_arenas as arenas_of
 from tests.evaluation.policies import always, forest, meadow, random_action, random_logits
 
 SIDE = 9  # of the meadow

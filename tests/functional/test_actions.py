@@ -60,6 +60,13 @@ def test_feasible_targets_are_inside_the_arena():
     assert F.feasible(cells, position).tolist() == expected
 
 
+@pytest.mark.parametrize("own_cell", list(F.Cell))
+def test_the_null_action_is_feasible_whatever_the_map_says_of_the_agents_cell(own_cell):
+    cells = torch.full((3, 3), int(F.Cell.OCCUPIED), dtype=torch.uint8)
+    cells[1, 1] = int(own_cell)
+    assert F.feasible(cells, torch.tensor([1, 1])).tolist() == [True] + [False] * 8
+
+
 def test_a_diagonal_between_two_trunks_is_feasible():
     cells, position = situation("""
         . T
