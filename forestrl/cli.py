@@ -9,6 +9,7 @@ COMMANDS = {
     "train": "train a policy with PPO",
     "eval": "measure a policy on fixed arenas",
     "render": "draw an episode",
+    "collisions": "count collisions with and without the filter",
 }
 
 

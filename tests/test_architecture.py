@@ -14,7 +14,7 @@ L1 = {"keys", "storage", "progress"}
 L2 = {"envs", "policies", "learning", "planner"}
 STUDIES = {"evaluation", "rendering"}
 L3 = {"config", "command", "loggers", "build"}
-L4 = {"train", "eval", "render", "bench", "figures", "export"}
+L4 = {"train", "eval", "render", "collisions", "bench", "figures", "export"}
 ROOMS = {  # room: the other rooms it may import from
     "": set(),
     "functional": set(),

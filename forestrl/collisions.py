@@ -1,0 +1,87 @@
+"""Counts collisions with and without the filter: ``python -m forestrl.collisions``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import sys
+from pathlib import Path
+from typing import Any
+
+from hydra.core.hydra_config import HydraConfig
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+from torchrl.envs import Compose, TransformedEnv
+from tqdm.auto import tqdm
+
+from forestrl import build
+from forestrl.command import command
+from forestrl.envs import ExplorationGraph, ForestEnv, SafetyFilter
+from forestrl.evaluation.episodes import evaluate
+from forestrl.policies.classical import RandomWalk
+from forestrl.storage import atomic_write
+
+_COLUMNS = ("policy", "filter", "size", "n_trees", "steps", "interventions", "collisions")
+
+
+def count(cfg: DictConfig, policy: Any, forest: dict[str, int], filtered: bool) -> dict[str, Any]:
+    """Runs a policy in forests of one kind and counts steps, interventions and collisions."""
+    settings = cfg.collisions
+
+    def make_env(arenas: int) -> TransformedEnv:
+        env: ForestEnv = instantiate(cfg.env, **forest, num_envs=arenas)
+        graph: ExplorationGraph = instantiate(cfg.graph)
+        return TransformedEnv(env, Compose(*([SafetyFilter()] if filtered else []), graph))
+
+    episodes = evaluate(
+        make_env,
+        policy,
+        seed=settings.seed,
+        indices=range(settings.arenas),
+        steps=settings.steps,
+        batch=settings.arenas,
+    )
+    return {
+        "filter": "on" if filtered else "off",
+        **forest,
+        "steps": settings.arenas * settings.steps,
+        "interventions": int(episodes.intervened.sum()),
+        "collisions": int(episodes.collisions.sum()),
+    }
+
+
+@command("collisions")
+def main(cfg: DictConfig) -> int:
+    """Runs a random and the learned policy over sizes and densities; returns the filter's failures.
+
+    The random policy draws among all nine actions. Without the filter both collide.
+    """
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    build.prepare(cfg)
+    build.make_output_folder(folder)
+    learned, _ = build.make_policy(cfg, set())
+    policies = {"random": RandomWalk(feasible_only=False), "learned": learned}
+    forests = [
+        {"size": size, "n_trees": round(density * size**2 / 50**2)}
+        for size, density in itertools.product(cfg.collisions.sizes, cfg.collisions.densities)
+    ]
+    runs = list(itertools.product(policies, (True, False), forests))
+    rows = []
+    for name, filtered, forest in tqdm(runs, disable=not sys.stderr.isatty()):
+        rows.append({"policy": name} | count(cfg, policies[name], forest, filtered))
+    table = io.StringIO(newline="")
+    writer = csv.DictWriter(table, _COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    atomic_write(folder / "collisions.csv", table.getvalue())
+    for name, filtered in itertools.product(policies, ("on", "off")):
+        chosen = [row for row in rows if row["policy"] == name and row["filter"] == filtered]
+        steps, hits = (sum(row[key] for row in chosen) for key in ("steps", "collisions"))
+        print(f"{name:<8} filter {filtered:<4} {steps:>10,} steps  {hits:>9,} collisions")
+    print(f"\nresults: {folder / 'collisions.csv'}")
+    return sum(row["collisions"] for row in rows if row["filter"] == "on")
+
+
+if __name__ == "__main__":
+    main()
