@@ -30,6 +30,8 @@ class ConfigError(ValueError):
 def prepare(cfg: DictConfig) -> None:
     """Sets threads and checks the device, before anything is built."""
     require_positive(cfg, "threads")
+    if cfg.seed < 0:
+        raise ConfigError(f"seed={cfg.seed} is not allowed: it must be 0 or more")
     torch.set_num_threads(cfg.threads)
     numba.set_num_threads(min(cfg.threads, numba.config.NUMBA_NUM_THREADS))
     try:
@@ -125,7 +127,7 @@ def make_policy(cfg: DictConfig, asked: set[str]) -> tuple[TensorDictModuleBase,
     if cfg.policy.name != "learned":
         settings = {key: value for key, value in cfg.policy.items() if key != "name"}
         return instantiate(settings), {"policy": cfg.policy.name}
-    path = Path(cfg.checkpoint) if cfg.checkpoint is not None else RELEASED
+    path = Path(str(cfg.checkpoint)) if cfg.checkpoint is not None else RELEASED
     policy = load_policy(path)
     wanted = {**architecture(cfg), "window": cfg.graph.window}
     groups = {name: "graph.window" if name == "window" else f"model.{name}" for name in wanted}

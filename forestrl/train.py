@@ -142,7 +142,7 @@ def _timing(batch: TensorDictBase, collect: float, update: float) -> dict[str, f
 
 def resumed(cfg: DictConfig) -> DictConfig:
     """Gives the configuration of the run to go on with; what was asked for now wins."""
-    path = Path(cfg.resume) / ".hydra" / "config.yaml"
+    path = Path(str(cfg.resume)) / ".hydra" / "config.yaml"
     if not path.is_file():
         raise FileNotFoundError(f"resume={cfg.resume} is not a run folder: {path} does not exist")
     old = DictConfig(OmegaConf.load(path))
@@ -160,7 +160,7 @@ def main(cfg: DictConfig) -> float:
     """
     run_dir = Path(HydraConfig.get().runtime.output_dir)
     if cfg.resume is not None:
-        run_dir, cfg = Path(cfg.resume), resumed(cfg)
+        run_dir, cfg = Path(str(cfg.resume)), resumed(cfg)
     build.prepare(cfg)
     build.require_positive(cfg, "total_frames", "eval.arenas", "eval.steps")
     build.make_output_folder(run_dir)

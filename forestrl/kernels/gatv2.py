@@ -12,22 +12,15 @@ alone: results depend neither on the rest of the batch nor, bit for bit, on the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from numba import njit
-from torch import Tensor, nn
-from torch.autograd.function import once_differentiable
 
 from forestrl.functional import DISPLACEMENTS, FEATURES, WAYPOINT_EDGES, WAYPOINTS
-from forestrl.kernels.simd import exp, group_sums, load, spread, static, store, where_positive
+from forestrl.kernels.simd import exp, group_sums, load, spread, store, where_positive
 
-_CHUNKS = 8  # of a batch; gradients are summed within and then over them
-_PER_THREAD = 32  # graphs that are worth starting a thread for
 _CORE = torch.cat((WAYPOINT_EDGES, torch.arange(WAYPOINTS).expand(2, -1)), -1)  # with self-loops
 _SPAN = (DISPLACEMENTS[_CORE[0]] - DISPLACEMENTS[_CORE[1]]).double().norm(dim=-1).numpy()  # cells
 _SOURCE, _TARGET = _CORE.numpy()
@@ -37,11 +30,11 @@ _CORE_EDGES = len(_SPAN)
 # layer 1; lin_l.weight and lin_r.weight have a row per feature. The scalars of layer 2 are a second
 # matrix of one column, in the rows of the same names.
 _LEFT, _RIGHT = 0, FEATURES
-_LEFT_BIAS, _RIGHT_BIAS, _EDGE, _ATT, _BIAS, _LEFT2, _RIGHT2, _ROWS = range(16, 24)
+_LEFT_BIAS, _RIGHT_BIAS, _EDGE, _ATT, _BIAS, _LEFT2, _RIGHT2, ROWS = range(16, 24)
 
 
-class _Graphs(NamedTuple):
-    """A batch of exploration graphs; see :func:`encode`."""
+class Graphs(NamedTuple):
+    """A batch of exploration graphs; see :func:`forestrl.kernels.encoder.encode`."""
 
     x: np.ndarray
     waypoint: np.ndarray
@@ -331,9 +324,9 @@ def _chunk(chunk, chunks, graphs, net, shapes, logits, d, d2):
 
 @njit(cache=True)
 def _pack(parameters, constants):
-    """Writes the parameters, in :func:`encode`'s order, as rows."""
+    """Writes the parameters, in :func:`forestrl.kernels.encoder.encode`'s order, as rows."""
     wide, dtype = len(parameters[0]), parameters[0].dtype
-    p, p2 = np.empty((_ROWS, wide), dtype), np.empty((_ROWS, 1), dtype)
+    p, p2 = np.empty((ROWS, wide), dtype), np.empty((ROWS, 1), dtype)
     p[_LEFT : _LEFT + FEATURES], p[_LEFT_BIAS] = parameters[0].T, parameters[1]
     p[_RIGHT : _RIGHT + FEATURES], p[_RIGHT_BIAS] = parameters[2].T, parameters[3]
     p[_EDGE], p[_ATT] = parameters[4][:, 0], parameters[5].reshape(-1)
@@ -344,8 +337,8 @@ def _pack(parameters, constants):
 
 
 @njit(cache=True)
-def _unpack(chunks, chunks2, gradients):
-    """Sums the chunks' gradients in order and writes them in :func:`encode`'s order."""
+def unpack_gradients(chunks, chunks2, gradients) -> None:
+    """Sums the chunks' gradients in order and writes them in the order of ``encode``."""
     p, p2 = chunks[0], chunks2[0]
     for c in range(1, len(chunks)):
         p += chunks[c]
@@ -359,138 +352,9 @@ def _unpack(chunks, chunks2, gradients):
 
 
 @njit(cache=True, nogil=True)
-def _run(part, parts, graphs, parameters, constants, shapes, logits, d, d2):
+def run_chunks(part, parts, graphs, parameters, constants, shapes, logits, d, d2) -> bool:
     """Runs one part of the chunks, :func:`_chunk`; tells whether the graphs are valid."""
     net, valid = _pack(parameters, constants), True
     for c in range(part * len(d) // parts, (part + 1) * len(d) // parts):
         valid &= _chunk(c, len(d), graphs, net, shapes, logits, d[c], d2[c])
     return valid
-
-
-@cache
-def _shapes(heads: int, hidden: int) -> tuple:
-    """Channels, heads and channels per head of both layers, as compile-time constants."""
-    return static(heads * hidden, heads, hidden), static(1, 1, 1)
-
-
-def _launch(
-    graphs: Sequence[Tensor], parameters: Sequence[Tensor], constants: tuple[float, float, float],
-    logits: Tensor, gradients: Sequence[Tensor] = (),
-) -> None:  # fmt: skip
-    """Writes the logits; or reads their gradients and writes those of the parameters."""
-    arrays = tuple([p.detach().numpy() for p in parameters])
-    _, heads, hidden = arrays[5].shape
-    rows = (max(1, min(_CHUNKS, len(logits))), _ROWS if gradients else 0)
-    d = np.zeros((*rows, heads * hidden), arrays[0].dtype)
-    d2 = np.zeros((*rows, 1), arrays[0].dtype)
-    shared = (
-        _Graphs(*[g.numpy() for g in graphs]), arrays, constants, _shapes(heads, hidden),
-        logits.numpy(), d, d2,
-    )  # fmt: skip
-    parts = max(1, min(torch.get_num_threads(), len(d), len(logits) // _PER_THREAD))
-    if parts == 1:
-        valid = _run(0, 1, *shared)
-    else:
-        with ThreadPoolExecutor(parts - 1) as pool:
-            others = [pool.submit(_run, part, parts, *shared) for part in range(1, parts)]
-            valid = _run(0, parts, *shared) and all([other.result() for other in others])
-    if not valid:
-        msg = f"the waypoint of a frontier must be in 1 to {WAYPOINTS - 1}"
-        raise ValueError(msg)
-    if gradients:
-        _unpack(d, d2, tuple([g.numpy() for g in gradients]))
-
-
-class _Encode(torch.autograd.Function):
-    """The encoder as one node of the autograd graph."""
-
-    @staticmethod
-    def forward(ctx: Any, constants: tuple[float, float, float], *tensors: Tensor) -> Tensor:
-        ctx.constants = constants
-        ctx.save_for_backward(*tensors)
-        logits = tensors[0].new_empty(len(tensors[0]), WAYPOINTS)
-        _launch(tensors[:4], tensors[4:], constants, logits)
-        return logits
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, d_logits: Tensor) -> tuple[Tensor | None, ...]:
-        tensors = ctx.saved_tensors
-        gradients = [torch.empty_like(p) for p in tensors[4:]]
-        _launch(tensors[:4], tensors[4:], ctx.constants, d_logits.contiguous(), gradients)
-        return (None,) * 5 + tuple(gradients)
-
-
-def encode(
-    x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor, parameters: Sequence[Tensor],
-    *, slopes: tuple[float, float], lidar_range: float,
-) -> Tensor:  # fmt: skip
-    """Computes the logits of the encoder from plain tensors on the CPU.
-
-    Args:
-        x: node features, float32 or float64 ``[*B, 9 + M, 8]``; there is no gradient for it.
-        waypoint: the waypoint each frontier is tied to, 1 to 8, int64 ``[*B, M]``.
-        length: the length of that edge in units of ``l``, ``[*B, M]``.
-        frontiers: the number of frontiers, int64 ``[*B, 1]``; the first ``M`` count.
-        parameters: of layer 1, then of layer 2: ``lin_l.weight``, ``lin_l.bias``,
-            ``lin_r.weight``, ``lin_r.bias``, ``lin_edge.weight``, ``att``, ``bias``.
-        slopes: the negative slopes of the two layers' LeakyReLU.
-        lidar_range: ``l``, cells.
-
-    Returns:
-        the outputs of nodes 0 to 8, ``[*B, 9]``.
-    """
-    if x.requires_grad or length.requires_grad:
-        msg = "the fused GATv2 kernel has no gradient for x and length: detach them or use 'pyg'"
-        raise ValueError(msg)
-    if x.dtype != parameters[0].dtype:
-        msg = f"x is {x.dtype} but the parameters are {parameters[0].dtype}"
-        raise TypeError(msg)
-    batch, nodes, room = x.shape[:-2], x.shape[-2], waypoint.shape[-1]
-    if x.shape[-1] != FEATURES or nodes != WAYPOINTS + room:
-        msg = f"x must be [*B, {WAYPOINTS} + {room}, {FEATURES}], not {list(x.shape)}"
-        raise ValueError(msg)
-    x = x.reshape(-1, nodes, FEATURES).contiguous()
-    graphs = (
-        x,
-        waypoint.reshape(len(x), room).contiguous(),
-        length.reshape(len(x), room).to(x.dtype).contiguous(),
-        frontiers.reshape(len(x)).contiguous(),
-    )
-    parameters = [p.contiguous() for p in parameters]
-    constants = (*slopes, 1.0 / lidar_range)
-    if torch.is_grad_enabled() and any([p.requires_grad for p in parameters]):
-        logits = _Encode.apply(constants, *graphs, *parameters)
-    else:
-        logits = x.new_empty(len(x), WAYPOINTS)
-        _launch(graphs, parameters, constants, logits)
-    return logits.view(*batch, WAYPOINTS)
-
-
-def gatv2_encoder(
-    x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor, conv1: nn.Module,
-    conv2: nn.Module, *, lidar_range: float = 5.0,
-) -> Tensor:  # fmt: skip
-    """Computes the logits, :func:`encode`, with the parameters of two ``GATv2Conv`` modules.
-
-    Args:
-        x: see :func:`encode`, as the others.
-        waypoint: int64 ``[*B, M]``.
-        length: ``[*B, M]``.
-        frontiers: int64 ``[*B, 1]``.
-        conv1: ``GATv2Conv(8, hidden, heads=heads, edge_dim=1)``, concatenating.
-        conv2: ``GATv2Conv(heads * hidden, 1, edge_dim=1)``.
-        lidar_range: ``l``, cells.
-
-    Returns:
-        the outputs of nodes 0 to 8, ``[*B, 9]``.
-    """
-    parameters = []
-    for conv in (conv1, conv2):
-        left, right, edge = conv.lin_l, conv.lin_r, conv.lin_edge
-        parameters += [left.weight, left.bias, right.weight, right.bias, edge.weight]
-        parameters += [conv.att, conv.bias]
-    slopes = conv1.negative_slope, conv2.negative_slope
-    return encode(
-        x, waypoint, length, frontiers, parameters, slopes=slopes, lidar_range=lidar_range
-    )

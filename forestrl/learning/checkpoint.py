@@ -41,13 +41,20 @@ def training_state(ppo: PPO, collector: Collector, progress: dict[str, Any]) -> 
 
 
 def restore_training(state: dict[str, Any], ppo: PPO, collector: Collector) -> dict[str, Any]:
-    """Puts a training back to where :func:`training_state` found it; returns ``progress``."""
-    ppo.actor.load_state_dict(state["actor"])
-    ppo.critic.load_state_dict(state["critic"])
+    """Puts a training back to where :func:`training_state` found it; returns ``progress``.
+
+    Raises:
+        ValueError: if the networks or the number of arenas are not the same.
+    """
+    try:
+        ppo.actor.load_state_dict(state["actor"])
+        ppo.critic.load_state_dict(state["critic"])
+        arenas = TensorDict(state["arenas"], collector.env.batch_size).unflatten_keys("/")
+    except RuntimeError as error:
+        raise ValueError(f"the training to go on with had other settings: {error}") from error
     ppo.optimizer.load_state_dict(state["optimizer"])
     torch.set_rng_state(state["rng"])
     collector.env.base_env.rng.set_state(state["env_rng"])
-    arenas = TensorDict(state["arenas"], collector.env.batch_size).unflatten_keys("/")
     collector._carrier.update(arenas)
     collector._frames = state["frames"]
     return state["progress"]

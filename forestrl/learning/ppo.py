@@ -110,12 +110,11 @@ class PPO:
             the mean over all minibatches of each part of the loss and of its diagnostics.
         """
         self.estimate_advantage(batch)
-        self.minibatches.empty()
-        self.minibatches.extend(batch.select(*_LEARNT_FROM).reshape(-1))
+        self.fill(batch)
         measured = []
         for _ in range(self.num_epochs):
             for minibatch in self.minibatches:
-                measured.append(self._step(minibatch))
+                measured.append(self.step(minibatch))
         means = torch.stack(measured).mean(0).tolist()
         metrics = dict(zip(_MEASURED.values(), means, strict=True))
         return metrics | {"ppo/explained_variance": explained_variance(batch)}
@@ -140,7 +139,12 @@ class PPO:
     def _value(self, states: TensorDictBase) -> Tensor:
         return self.critic(states.select(*K.GRAPH))["state_value"]
 
-    def _step(self, minibatch: TensorDictBase) -> Tensor:
+    def fill(self, batch: TensorDictBase) -> None:
+        """Makes a batch with advantages the one that ``minibatches`` draws from."""
+        self.minibatches.empty()
+        self.minibatches.extend(batch.select(*_LEARNT_FROM).reshape(-1))
+
+    def step(self, minibatch: TensorDictBase) -> Tensor:
         """Takes one Adam step; returns what ``_MEASURED`` lists, float32 ``[n]``."""
         losses = self.loss(minibatch)
         self.optimizer.zero_grad()

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from torch_geometric.nn import GATv2Conv
 
 from forestrl import functional as F
-from forestrl.kernels.gatv2 import gatv2_encoder
+from forestrl.kernels.encoder import gatv2_encoder
 
 Kernel = Literal["fused", "pyg"]
 Readout = Literal["mean", "concat"]

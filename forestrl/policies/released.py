@@ -49,9 +49,16 @@ class Policy:
     weights: dict[str, torch.Tensor]
 
     def build(self, kernel: Kernel = "fused") -> ActorCritic:
-        """Builds the networks with these weights."""
+        """Builds the networks with these weights.
+
+        Raises:
+            CheckpointError: if they do not fit the model.
+        """
         networks = ActorCritic(**self.model, kernel=kernel)
-        networks.load_state_dict(self.weights)
+        try:
+            networks.load_state_dict(self.weights)
+        except RuntimeError as error:
+            raise CheckpointError(f"the policy's weights do not fit its model: {error}") from error
         return networks.eval().requires_grad_(False)
 
 
@@ -88,7 +95,12 @@ def load_policy(path: str | Path) -> Policy:
             f"checkpoint={path} is a safetensors file but not a policy of this program: its "
             f"format is {header.get('format')!r}, not {FORMAT!r}"
         )
-    parts = {name: json.loads(header[name]) for name in ("model", "window", "training")}
+    try:
+        parts = {name: json.loads(header[name]) for name in ("model", "window", "training")}
+    except (KeyError, json.JSONDecodeError) as error:
+        raise CheckpointError(
+            f"checkpoint={path} cannot be read as a policy: its header is damaged: {error}"
+        ) from error
     return Policy(**parts, weights=weights)
 
 

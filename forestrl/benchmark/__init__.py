@@ -1,0 +1,1 @@
+"""How fast each part of a training is on this machine, and how its cost grows with the work."""
