@@ -92,8 +92,7 @@ def _check_kinds(cfg: DictConfig) -> None:
 
 def _same_kind(given: Any, default: Any) -> bool:
     if isinstance(default, ListConfig):
-        alike = isinstance(given, ListConfig) and len(given) == len(default)
-        return alike and all(map(_same_kind, given, default))
+        return isinstance(given, ListConfig) and all(_same_kind(each, default[0]) for each in given)
     if isinstance(default, float):
         return type(given) in (int, float) and math.isfinite(given)
     return type(default) not in _KINDS or type(given) is type(default)

@@ -54,7 +54,7 @@ class PPO:
         gae_lambda: float = 0.95,
         clip_epsilon: float = 0.2,
         critic_coeff: float = 1.0,
-        entropy_coeff: float = 0.0,
+        entropy_coeff: float = 0.02,
         max_grad_norm: float = 0.5,
     ) -> None:
         positive = {
