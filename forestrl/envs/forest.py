@@ -16,7 +16,7 @@ from forestrl import kernels
 from forestrl import keys as K
 
 SMALLEST_SIZE = 3
-_ATTEMPTS = 32  # forests drawn before giving up on finding one with a free cell
+_ATTEMPTS = 8  # forests drawn before giving up on finding one with a free cell
 
 
 class ForestEnv(EnvBase):
@@ -66,7 +66,7 @@ class ForestEnv(EnvBase):
         _check("size", size, size >= SMALLEST_SIZE, f"at least {SMALLEST_SIZE}")
         _check("n_trees", n_trees, n_trees >= 0, "0 or more")
         ordered = len(tree_radius) == 2 and 0 < tree_radius[0] <= tree_radius[1]
-        _check("tree_radius", list(tree_radius), ordered, "[smallest, largest] with 0 < smallest")
+        _check("tree_radius", list(tree_radius), ordered, "[smallest, largest] with 0 < smallest <= largest")
         in_sight = lidar_range >= math.sqrt(2)
         _check("lidar_range", lidar_range, in_sight, "at least 1.415: the 8 neighbours are seen")
         _check("coverage_goal", coverage_goal, 0 < coverage_goal <= 1, "in (0, 1]")

@@ -139,7 +139,8 @@ def gatv2_encoder(
         the outputs of nodes 0 to 8, ``[*B, 9]``.
     """
     parameters: list[Any] = []
-    for conv in (conv1, conv2):
+    convs: tuple[Any, ...] = (conv1, conv2)
+    for conv in convs:
         left, right, edge = conv.lin_l, conv.lin_r, conv.lin_edge
         parameters += [left.weight, left.bias, right.weight, right.bias, edge.weight]
         parameters += [conv.att, conv.bias]

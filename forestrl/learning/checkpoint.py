@@ -14,6 +14,7 @@ import torch
 from tensordict import TensorDict
 from torchrl.collectors import Collector
 
+from forestrl import keys as K
 from forestrl.learning.ppo import PPO
 from forestrl.storage import atomic_write
 
@@ -44,7 +45,7 @@ def restore_training(state: dict[str, Any], ppo: PPO, collector: Collector) -> d
     """Puts a training back to where :func:`training_state` found it; returns ``progress``.
 
     Raises:
-        ValueError: if the networks or the number of arenas are not the same.
+        ValueError: if the networks or the number or size of the arenas are not the same.
     """
     try:
         ppo.actor.load_state_dict(state["actor"])
@@ -52,6 +53,12 @@ def restore_training(state: dict[str, Any], ppo: PPO, collector: Collector) -> d
         arenas = TensorDict(state["arenas"], collector.env.batch_size).unflatten_keys("/")
     except RuntimeError as error:
         raise ValueError(f"the training to go on with had other settings: {error}") from error
+    before, now = arenas[K.TREES].shape, collector._carrier[K.TREES].shape
+    if before != now:
+        raise ValueError(
+            f"the training to go on with had arenas {list(before)}, these are {list(now)}: leave "
+            "env.size and env.num_envs as they were"
+        )
     ppo.optimizer.load_state_dict(state["optimizer"])
     torch.set_rng_state(state["rng"])
     collector.env.base_env.rng.set_state(state["env_rng"])

@@ -8,8 +8,8 @@ from forestrl.policies.classical import RandomWalk
 from forestrl.policies.released import load_policy
 from tests.commands import compose, train
 
-ARENA = ("env.size=10", "env.n_trees=0")
-STEPS, ARENAS, MARGIN = 40, 100, 0.1
+ARENA = ("env.size=10", "env.n_trees=0", "env.lidar_range=2.0")
+STEPS, ARENAS, MARGIN = 40, 100, 0.2
 
 
 def coverage(policy):
