@@ -9,6 +9,8 @@ COMMANDS = {
     "train": "train a policy with PPO",
     "eval": "measure a policy on fixed arenas",
     "render": "draw an episode",
+    "figures": "draw the figures from their result files",
+    "bench": "measure frames per second on this machine",
     "collisions": "count collisions with and without the filter",
 }
 
@@ -29,7 +31,7 @@ def main() -> None:
 
 
 def _help() -> str:
-    commands = "\n".join(f"  {name:<9}{line}" for name, line in COMMANDS.items())
+    commands = "\n".join(f"  {name:<11}{line}" for name, line in COMMANDS.items())
     return (
         "usage: forestrl <command> [overrides]\n\n"
         f"commands:\n{commands}\n\n"

@@ -2,102 +2,49 @@
 
 from __future__ import annotations
 
-import gc
-import itertools
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
-from tensordict import TensorDict
+from tensordict import TensorDict, TensorDictBase
 
-from forestrl import keys as K
 from forestrl.benchmark import stages
 from forestrl.benchmark.machine import peak_memory
+from forestrl.benchmark.rows import Row
 from forestrl.benchmark.stages import Parts
-from forestrl.benchmark.states import arrange
-from forestrl.benchmark.timing import Timing, measure, timed
+from forestrl.benchmark.timing import Timing, measure, summary
 from forestrl.learning.metrics import summarize
+from forestrl.learning.ppo import PPO
 
 LONG_UPDATE = 10
 """An update of more than this many budgets is estimated from its minibatches."""
 
-
-@dataclass(frozen=True)
-class Row:
-    """One stage of one cell: a line of ``bench.csv``.
-
-    ``seconds`` is one call on ``frames`` frames, and of an env stage all transforms up to it;
-    ``added`` is what the stage adds to the cost of one collected frame, seconds, and ``share`` that
-    as a part of the whole pipeline's. ``how`` is ``measured``, ``estimated``, or why not.
-    """
-
-    size: int
-    n_trees: int
-    num_envs: int
-    stage: str
-    frames: int = 0
-    seconds: float | None = None
-    frames_per_second: float | None = None
-    added: float | None = None
-    share: float | None = None
-    percentile_99: float | None = None
-    repeats: int = 0
-    how: str = "measured"
-    coverage: float | None = None
-    frontiers: float | None = None
-    peak_memory_gb: float | None = None
+_DECISIONS = 500  # at least, for the 99th percentile
+_ITERATIONS = 5  # at most
 
 
 def measure_cell(
-    make_parts: Callable[[int], Parts], worlds: TensorDict, blank: Row, seconds: float
+    parts: Parts, batches: Sequence[TensorDict], blank: Row, seconds: float
 ) -> list[Row]:
-    """Times all stages at one size and one number of arenas.
+    """Times all stages but the single decision.
 
     Args:
-        make_parts: makes what is measured, for a number of arenas.
-        worlds: explored arenas of that size.
-        blank: a row with size, trunks and number of arenas.
+        parts: what is measured.
+        batches: explored arenas, from :func:`forestrl.benchmark.states.arrange`.
+        blank: a row that says what the cell is.
         seconds: budget for each stage.
 
     Returns:
-        a row for each stage, in the pipeline's order.
+        a row for each stage: the pipeline, then a training iteration and an evaluation step.
     """
-    parts, batches = make_parts(blank.num_envs), arrange(worlds, blank.num_envs)
-    rows = _measure_steps(parts, batches, blank, seconds)
-    rows |= _measure_learning(parts, batches[0], blank, rows, seconds)
-    rows |= _measure_decisions(make_parts, worlds, blank, seconds) if blank.num_envs == 1 else {}
-    added = _added(rows, list(parts.envs), parts.ppo.num_epochs)
-    total = sum(added.values()) if all(row.seconds for row in rows.values()) else None
-    del parts
-    gc.collect()
-    measured = [
-        replace(
-            row,
-            added=added.get(name),
-            share=added[name] / total if total and name in added else None,
-            peak_memory_gb=peak_memory(),
-        )
-        for name, row in rows.items()
-    ]
-    return measured
+    timings = measure_steps(parts, batches, seconds)
+    rows = {name: blank.timed(name, blank.num_envs, timing) for name, timing in timings.items()}
+    rows |= _measure_learning(parts, batches[0], blank, seconds)
+    rows[stages.EVALUATION] = rows.pop(stages.EVALUATION)  # last
+    return [replace(row, peak_memory_gb=peak_memory()) for row in _with_shares(rows, parts)]
 
 
-def _row(blank: Row, stage: str, frames: int, timing: Timing, how: str = "measured") -> Row:
-    return replace(
-        blank,
-        stage=stage,
-        frames=frames,
-        seconds=timing.median,
-        frames_per_second=frames / timing.median,
-        percentile_99=timing.percentile_99,
-        repeats=timing.repeats,
-        how=how,
-    )
-
-
-def measure_steps(
-    parts: Parts, batches: Sequence[TensorDict], seconds: float
-) -> dict[str, Timing]:
+def measure_steps(parts: Parts, batches: Sequence[TensorDict], seconds: float) -> dict[str, Timing]:
     """Times one step of each env, of the policy and of evaluation, in turns."""
     calls = {name: stages.env_step(env, batches) for name, env in parts.envs.items()}
     calls[stages.POLICY] = stages.policy_forward(parts, batches)
@@ -105,39 +52,85 @@ def measure_steps(
     return measure(calls, seconds)
 
 
-def _measure_steps(
+def measure_decision(
     parts: Parts, batches: Sequence[TensorDict], blank: Row, seconds: float
-) -> dict[str, Row]:
-    timings = measure_steps(parts, batches, seconds)
-    return {name: _row(blank, name, blank.num_envs, timing) for name, timing in timings.items()}
+) -> list[Row]:
+    """Times a single decision, without and with the filter.
+
+    Args:
+        parts: those of one arena.
+        batches: one explored arena each.
+        blank: a row that says what the cell is.
+        seconds: budget for each of the two.
+    """
+    timings = measure(stages.decision(parts, batches), seconds, least=_DECISIONS)
+    rows = [blank.timed(name, 1, timing) for name, timing in timings.items()]
+    return [replace(row, peak_memory_gb=peak_memory()) for row in rows]
 
 
 def _measure_learning(
-    parts: Parts, worlds: TensorDict, blank: Row, steps: Mapping[str, Row], seconds: float
+    parts: Parts, worlds: TensorDict, blank: Row, seconds: float
 ) -> dict[str, Row]:
     """Times GAE, a minibatch and a whole iteration; skips them if no batch can be collected."""
     names = (stages.ADVANTAGE, stages.MINIBATCH, stages.ITERATION)
-    ppo, collector = parts.ppo, parts.collector
-    if collector is None:
-        how = f"skipped: num_envs does not divide frames_per_batch={ppo.frames_per_batch}"
+    ppo = parts.ppo
+    if parts.make_collector is None:
+        how = f"skipped: it does not divide frames_per_batch={ppo.frames_per_batch}"
         return {name: replace(blank, stage=name, how=how) for name in names}
+    collector = parts.make_collector()
     stages.start_collecting(collector, worlds)
     collected = iter(collector)
-    batch = next(collected)
-    timings = measure({names[0]: stages.advantage(ppo, batch)}, seconds)
-    timings |= measure({names[1]: stages.minibatch(ppo, batch)}, seconds)
-    start = time.perf_counter()
-    batch = next(collected)
-    collect = time.perf_counter() - start
-    update = ppo.num_epochs * ppo.num_minibatches * timings[names[1]].median
-    update += timings[names[0]].median
-    how = "estimated"
-    if update <= LONG_UPDATE * seconds:
-        how, update = "measured", timed(lambda: summarize(batch) | ppo.update(batch))
-    timings[names[2]] = Timing(collect + update, collect + update, 1)
+    batch = next(collected)  # the first of a process also compiles
+    advantage = measure({"": stages.advantage(ppo, batch)}, seconds)[""]
+    minibatch = measure({"": stages.minibatch(ppo, batch)}, seconds)[""]
+    minibatches = ppo.num_epochs * ppo.frames_per_batch // ppo.minibatches.batch_size
+    update = advantage.median + minibatches * minibatch.median
+    short = update <= LONG_UPDATE * seconds
+    iteration = _measure_iteration(ppo, collected, None if short else update, seconds)
     collector.shutdown()
-    frames = (ppo.frames_per_batch, ppo.minibatches._batch_size, ppo.frames_per_batch)
+    how = "measured" if short else "estimated"
     return {
-        name: _row(blank, name, n, timings[name], how if name == stages.ITERATION else "measured")
-        for name, n in zip(names, frames, strict=True)
+        names[0]: blank.timed(names[0], ppo.frames_per_batch, advantage),
+        names[1]: blank.timed(names[1], ppo.minibatches.batch_size, minibatch),
+        names[2]: blank.timed(names[2], ppo.frames_per_batch, iteration, how),
     }
+
+
+def _measure_iteration(
+    ppo: PPO, collected: Iterator[TensorDictBase], update: float | None, seconds: float
+) -> Timing:
+    """Times iterations until half the time of a long update has passed; once at least.
+
+    Args:
+        ppo: learns.
+        collected: gives batches.
+        update: estimate to take for the update; None to measure it.
+        seconds: budget for one stage.
+    """
+    times: list[float] = []
+    while sum(times) < LONG_UPDATE / 2 * seconds and len(times) < _ITERATIONS:
+        start = time.perf_counter()
+        batch = next(collected)
+        if update is None:
+            summarize(batch) | ppo.update(batch)
+        times.append(time.perf_counter() - start + (update or 0.0))
+    return summary(times)
+
+
+def _with_shares(rows: Mapping[str, Row], parts: Parts) -> Iterable[Row]:
+    """Fills in what the stages of the pipeline add, if all of them were measured."""
+    added, before = {}, 0.0
+    for name in (*parts.envs, *stages.LEARNING):
+        if (seconds := rows[name].seconds) is None:
+            return rows.values()
+        each = seconds / rows[name].frames
+        if name in parts.envs:
+            added[name] = max(each - before, 0.0)
+            before = max(each, before)
+        else:
+            added[name] = each * (parts.ppo.num_epochs if name == stages.MINIBATCH else 1)
+    total = sum(added.values())
+    return [
+        replace(row, added=added[name], share=added[name] / total) if name in added else row
+        for name, row in rows.items()
+    ]

@@ -40,6 +40,8 @@ T = TypeVar("T")
 Call = Callable[[], object]
 
 POLICY, ADVANTAGE, MINIBATCH = "policy forward", "GAE", "PPO minibatch"
+LEARNING = (POLICY, ADVANTAGE, MINIBATCH)
+"""The pipeline's stages behind those of the envs."""
 ITERATION, EVALUATION = "train iteration", "evaluation step"
 DECISION, SAFE_DECISION = "decision", "decision + filter"
 
@@ -53,14 +55,14 @@ class Parts:
         evaluation: the env as evaluation sees it.
         networks: actor and critic.
         ppo: learns with these networks.
-        collector: collects as in training; None if the arenas do not divide a batch.
+        make_collector: makes what collects in training; None if the arenas do not divide a batch.
     """
 
     envs: dict[str, EnvBase]
     evaluation: EnvBase
     networks: ActorCritic
     ppo: PPO
-    collector: Collector | None
+    make_collector: Callable[[], Collector] | None
 
 
 def env_step(env: EnvBase, worlds: Sequence[TensorDict]) -> Call:

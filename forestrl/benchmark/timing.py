@@ -42,18 +42,18 @@ def measure(
     while rounds < least or (rounds < most and time.perf_counter() < end):
         rounds += 1
         for name, call in calls.items():
-            samples[name].append(timed(call))
-    return {name: _summary(times) for name, times in samples.items()}
+            samples[name].append(_timed(call))
+    return {name: summary(times) for name, times in samples.items()}
 
 
-def timed(call: Callable[[], Any]) -> float:
+def _timed(call: Callable[[], Any]) -> float:
     """Gives the seconds that one call takes."""
     start = time.perf_counter()
     call()
     return time.perf_counter() - start
 
 
-def _summary(times: list[float]) -> Timing:
+def summary(times: list[float]) -> Timing:
     """Sums samples up; the 99th percentile is the nearest rank, of few samples the largest."""
     rank = math.ceil(0.99 * len(times)) - 1
     return Timing(statistics.median(times), sorted(times)[rank], len(times))
