@@ -118,7 +118,7 @@ def make_policy(cfg: DictConfig, asked: set[str]) -> tuple[TensorDictModuleBase,
     """Builds the policy to evaluate or draw, and describes it.
 
     A learned policy brings its own model and window; a setting that was asked for on the command
-    line and differs from the policy's own is refused.
+    line and differs from the policy's own is refused. Its unit of length is the world's own ``l``.
 
     Args:
         cfg: the whole configuration; ``graph.window`` is set to a learned policy's own.
@@ -133,8 +133,9 @@ def make_policy(cfg: DictConfig, asked: set[str]) -> tuple[TensorDictModuleBase,
     groups = {name: "graph.window" if name == "window" else f"model.{name}" for name in wanted}
     require_same(policy, {n: v for n, v in wanted.items() if groups[n] in asked}, str(path))
     cfg.graph.window = policy.window
-    networks = policy.build(cfg.model.kernel).to(cfg.device)
-    about = {"policy": "learned", "checkpoint": str(path), "training": policy.training}
+    networks = policy.build(cfg.model.kernel, cfg.env.lidar_range).to(cfg.device)
+    name = "released" if cfg.checkpoint is None else str(path)
+    about = {"policy": "learned", "checkpoint": name, "training": policy.training}
     about["actions"] = "mode" if cfg.policy.deterministic else "sampled"
     return networks.make_policy(cfg.policy.deterministic), about
 

@@ -48,13 +48,18 @@ class Policy:
     training: dict[str, Any]
     weights: dict[str, torch.Tensor]
 
-    def build(self, kernel: Kernel = "fused") -> ActorCritic:
+    def build(self, kernel: Kernel = "fused", lidar_range: float | None = None) -> ActorCritic:
         """Builds the networks with these weights.
+
+        Args:
+            kernel: what computes them.
+            lidar_range: ``l``, the unit of edge lengths, cells; by default that of the training.
 
         Raises:
             CheckpointError: if they do not fit the model.
         """
-        networks = ActorCritic(**self.model, kernel=kernel)
+        unit = {} if lidar_range is None else {"lidar_range": lidar_range}
+        networks = ActorCritic(**{**self.model, **unit}, kernel=kernel)
         try:
             networks.load_state_dict(self.weights)
         except RuntimeError as error:
