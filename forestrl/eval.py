@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,7 @@ def main(cfg: DictConfig) -> float:
     meta = {
         **about,
         "version": __version__,
+        "command": shlex.join(["forestrl", "eval", *HydraConfig.get().overrides.task]),
         "env": OmegaConf.to_container(cfg.env, resolve=True),
         "eval": OmegaConf.to_container(cfg.eval, resolve=True),
         "filter": cfg.safety.get("_target_") is not None,

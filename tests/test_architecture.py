@@ -10,9 +10,9 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
 
 L0 = {"functional", "kernels"}
-L1 = {"keys", "storage", "progress"}
+L1 = {"keys", "paper", "storage", "progress"}
 L2 = {"envs", "policies", "learning", "planner"}
-STUDIES = {"evaluation", "rendering"}
+STUDIES = {"evaluation", "publishing", "rendering", "benchmark"}
 L3 = {"config", "command", "loggers", "build"}
 L4 = {"train", "eval", "render", "collisions", "bench", "figures", "export"}
 ROOMS = {  # room: the other rooms it may import from
@@ -24,6 +24,8 @@ ROOMS = {  # room: the other rooms it may import from
     "planner": L0 | L1 | {"policies"},
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
+    "benchmark": L0 | L1 | {"envs", "policies", "learning", "evaluation"},
+    "publishing": {"paper"},
     "config": set(),
     "command": {"config"},
     "loggers": {"storage"},
@@ -36,7 +38,9 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "functional": {"torch"},
     "kernels": {"torch", "numba", "llvmlite", "numpy"},
     "keys": {"torch", "tensordict"},
+    "paper": set(),
     "storage": set(),
+    "publishing": {"numpy", "scipy", "matplotlib"},
     "progress": {"tqdm"},
     "cli": set(),
 }

@@ -76,7 +76,8 @@ def test_everything_was_found():
 def test_every_command_has_a_whole_configuration(name):
     cfg = compose(name)
     OmegaConf.to_container(cfg, resolve=True, throw_on_missing=True)
-    assert {"env", "safety", "graph", "reward", "model", "seed", "device"} <= cfg.keys()
+    if name != "figures":  # it only reads files
+        assert {"env", "safety", "graph", "reward", "model", "seed", "device"} <= cfg.keys()
 
 
 def test_names_that_people_rely_on():

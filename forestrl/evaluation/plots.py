@@ -9,15 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from forestrl import paper as P
 from forestrl.evaluation.episodes import Episodes
-
-PAPER_COVERAGE = {1000: 0.80, 2000: 0.95, 2500: 0.97}
-"""Fig. 3b: mean coverage by step; h = 50, 45 trunks."""
-PAPER_INTERVENTION_RATE = 0.10
-"""Fig. 3c: mean share of steps with an intervention."""
-PAPER_SHARE_UNDER_LIMIT = 0.80
-INTERVENTION_LIMIT = 0.15
-"""Fig. 3c: 80 % of the runs have fewer interventions than this."""
 
 _SIZE, _DPI = (6.4, 4.0), 150  # inches, dots per inch: 960 x 600 pixels
 _OURS, _THEIRS = "#0072B2", "black"  # a mid grey and black in print
@@ -54,7 +47,7 @@ def coverage_png(episodes: Episodes, *, title: str, paper: bool = True) -> bytes
             label="95 % interval of the mean",
         )
     axes.plot(steps, 100 * curve.mean, color=_OURS, lw=1.8, label=f"mean of {_arenas(episodes)}")
-    marks = {step: level for step, level in PAPER_COVERAGE.items() if step <= episodes.steps}
+    marks = {step: level for step, level in P.COVERAGE.items() if step <= episodes.steps}
     if paper and marks:
         axes.plot(
             list(marks),
@@ -92,13 +85,13 @@ def interventions_png(episodes: Episodes, *, title: str, paper: bool = True) -> 
     axes.hist(100 * rate, (100 * edges).tolist(), weights=weight, color=_BARS, ec="white", lw=0.8)
     axes.axvline(100 * rate.mean(), color=_OURS, lw=2.2, label=f"mean: {100 * rate.mean():.1f} %")
     if paper:
-        label = f"paper's mean: {100 * PAPER_INTERVENTION_RATE:.0f} %"
-        axes.axvline(100 * PAPER_INTERVENTION_RATE, color=_THEIRS, lw=1.4, ls="--", label=label)
-    share = (rate < INTERVENTION_LIMIT).mean()
-    label = f"{100 * INTERVENTION_LIMIT:.0f} %: {100 * share:.0f} % of runs lie below"
+        label = f"paper's mean: {100 * P.INTERVENTION_RATE:.0f} %"
+        axes.axvline(100 * P.INTERVENTION_RATE, color=_THEIRS, lw=1.4, ls="--", label=label)
+    share = (rate < P.INTERVENTION_LIMIT).mean()
+    label = f"{100 * P.INTERVENTION_LIMIT:.0f} %: {100 * share:.0f} % of runs lie below"
     if paper:
-        label += f" (paper: {100 * PAPER_SHARE_UNDER_LIMIT:.0f} %)"
-    axes.axvline(100 * INTERVENTION_LIMIT, color=_THEIRS, lw=1.4, ls=":", label=label)
+        label += f" (paper: {100 * P.SHARE_UNDER_LIMIT:.0f} %)"
+    axes.axvline(100 * P.INTERVENTION_LIMIT, color=_THEIRS, lw=1.4, ls=":", label=label)
     axes.set_xlim(0, 100 * end)
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])  # room for the legend
     axes.set_yticks([tick for tick in axes.get_yticks() if tick <= 100])

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from forestrl.evaluation.episodes import Episodes
-from forestrl.evaluation.plots import INTERVENTION_LIMIT, coverage_png, interventions_png
+from forestrl.evaluation.plots import coverage_png, interventions_png
+from forestrl.paper import INTERVENTION_LIMIT
 from forestrl.storage import atomic_write
 
 LEVELS = (80, 90, 95, 98)
@@ -125,9 +126,12 @@ def _arrival(steps: NDArray) -> dict[str, float | None]:
 
 
 def _episode_rows(episodes: Episodes) -> Iterable[Sequence[Any]]:
+    areas = {upto: episodes.area_under_curve(upto) for upto in AREAS if upto <= episodes.steps}
     columns = {
         "index": episodes.index,
         "coverage": episodes.coverage[:, -1],
+        **{f"coverage_{n}": episodes.coverage[:, n] for n in CHECKPOINTS if n <= episodes.steps},
+        **{f"area_{upto}": area for upto, area in areas.items()},
         "free_share": episodes.free_share,
         **{f"steps_to_{level}": episodes.steps_to(level / 100) for level in LEVELS},
         "intervention_rate": episodes.intervention_rate(),

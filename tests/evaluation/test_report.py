@@ -44,6 +44,7 @@ def test_rows_of_the_table_of_episodes(tmp_path):
     assert first == {
         "index": "0",
         "coverage": "1",
+        "coverage_250": "1",
         "free_share": "0.9",
         **dict.fromkeys(["steps_to_80", "steps_to_90", "steps_to_95", "steps_to_98"], "10"),
         "intervention_rate": "0.1",

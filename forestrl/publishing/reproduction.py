@@ -1,0 +1,86 @@
+"""The paper's statements beside what was measured here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal, NamedTuple
+
+from forestrl import paper as P
+from forestrl.publishing.results import Results
+from forestrl.publishing.statistics import Interval
+from forestrl.publishing.tables import LABELS, Column, forest, markdown
+
+Kind = Literal["≥", "≤", ""]
+"""Whether more is better, less is, or neither."""
+
+
+class _Claim(NamedTuple):
+    """A number of the paper, and where ours is found."""
+
+    label: str
+    setting: str
+    policy: str
+    measure: str
+    share: float
+    kind: Kind
+
+
+def reproduction(results: Results, policy: str) -> str:
+    """Sets the paper's statements beside ours; only those that were measured.
+
+    Args:
+        results: what was read.
+        policy: name of the learned policy.
+
+    Returns:
+        a Markdown table, empty if nothing was measured.
+    """
+    rows = []
+    for claim in _claims(policy):
+        method = results.method(claim.setting, claim.policy)
+        value = method.measure(claim.measure) if method else None
+        if method and value:
+            paper = f"{claim.kind} {100 * claim.share:.0f}".strip()
+            here = Column("", claim.measure).cell(value)
+            reached = verdict(value, claim.share, claim.kind)
+            rows.append([claim.label, paper, here, method.unit, reached])
+    head = ["statement of the paper (%)", "paper", "here", "± over", "reached"]
+    return markdown(head, rows) if rows else ""
+
+
+def _claims(policy: str) -> Iterable[_Claim]:
+    """All statements of Sec. III with a number."""
+    learned, rate = LABELS.get(policy, f"`{policy}`"), "intervention_rate"
+    for step, share in P.COVERAGE.items():
+        label, measure = f"{learned}: coverage at {step} steps", f"coverage_{step}"
+        yield _Claim(label, "nominal", policy, measure, share, "≥")
+    yield _Claim("interventions, mean", "nominal", policy, rate, P.INTERVENTION_RATE, "≤")
+    label, measure = "runs with under 15 % interventions", "share_under_15"
+    yield _Claim(label, "nominal", policy, measure, P.SHARE_UNDER_LIMIT, "≥")
+    for setting, step in P.PASSED_AT.items():
+        label, measure = f"{forest(setting)}: coverage at {step} steps", f"coverage_{step}"
+        yield _Claim(label, setting, policy, measure, P.MORE_THAN, "≥")
+    label = "75 trunks: interventions, mean"
+    yield _Claim(label, "trees75", policy, rate, P.DENSE_INTERVENTION_RATE, "≤")
+    for name, share in P.BENCHMARKS.items():
+        planner = f"{name}_published"
+        label, measure = f"{LABELS[planner]}: coverage at 2500 steps", "coverage_2500"
+        yield _Claim(label, "nominal", planner, measure, share, "")
+
+
+def verdict(value: Interval, share: float, kind: Kind) -> str:
+    """Tells whether a number of the paper was reached.
+
+    Args:
+        value: ours, with its interval.
+        share: the paper's.
+        kind: whether more is better, less is, or neither.
+
+    Returns:
+        yes, within the interval, or no with the difference in percentage points.
+    """
+    if (kind == "≥" and value.mean >= share) or (kind == "≤" and value.mean <= share):
+        return "yes"
+    if value.low <= share <= value.high:
+        return "within the interval"
+    return f"no: {100 * (value.mean - share):+.1f}".replace("-", "−")

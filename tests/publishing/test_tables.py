@@ -1,0 +1,126 @@
+"""The tables' text by hand."""
+
+import math
+
+import pytest
+
+from forestrl.publishing.comparisons import differences, forests
+from forestrl.publishing.reproduction import reproduction, verdict
+from forestrl.publishing.results import read_results
+from forestrl.publishing.statistics import Interval
+from forestrl.publishing.tables import Column, headline, markdown
+from tests.publishing.folders import write_evaluation
+
+
+def cells(table, label):
+    """The cells of the one row that begins with a label, by the head of their column."""
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+    (row,) = (line for line in lines if line[0] == label)
+    return dict(zip(lines[0], row, strict=True))
+
+
+def test_markdown():
+    assert markdown(["a", "b"], [["x", "1"], ["y", "2"]]) == (
+        "| a | b |\n| --- | ---: |\n| x | 1 |\n| y | 2 |\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("interval", "text"),
+    [
+        (None, "–"),
+        (Interval(0.5), "50.0"),
+        (Interval(0.971, 0.969, 0.972), "97.1 ± 0.2"),
+        (Interval(0.0), "0"),
+        (Interval(0.0, 0.0, 0.0), "0"),
+    ],
+)
+def test_cells(interval, text):
+    assert Column("", "").cell(interval) == text
+
+
+def test_headline_sets_the_paper_beside_ours_and_marks_the_best(tmp_path):
+    write_evaluation(tmp_path, coverage=(0.9, 0.8))
+    write_evaluation(tmp_path, name="nearest_frontier", coverage=(1.0, 0.98), rate=0)
+    write_evaluation(tmp_path, name="hindsight", coverage=(1.0, 1.0), rate=0)
+    write_evaluation(tmp_path, name="my_planner", coverage=(0.5, 0.5), rate=0.2)
+    table = headline(read_results(tmp_path))
+    ours, theirs = cells(table, "GATv2 and PPO"), cells(table, "*paper: GATv2 and PPO*")
+    assert ours["± over"] == "2 arenas" and ours["coverage at 2500"] == "85.0 ± 1.0"
+    assert theirs["coverage at 2500"] == "97.0"
+    assert theirs["coverage at 250"] == "–" and theirs["their 80th percentile"] == "15.0"
+    best = cells(table, "nearest frontier")
+    assert best["coverage at 2500"] == "**99.0 ± 1.0**"
+    assert best["interventions"] == "0"
+    assert ours["interventions"] == "**10.0 ± 1.0**"
+    assert ours["steps to 98 %"] == "**400 ± 10** (100 %)"
+    assert "**" not in "".join(cells(table, "hindsight (sees the whole forest)").values())
+    assert table.splitlines()[-1].startswith("| `my_planner` |")
+
+
+def test_a_method_of_several_seeds_has_a_row_over_seeds_and_one_of_its_checkpoint(tmp_path):
+    for seed, share in enumerate((0.8, 0.9)):
+        name = f"learned_seed{seed}" if seed else "learned"
+        write_evaluation(tmp_path, name=name, coverage=(share, share))
+    table = headline(read_results(tmp_path))
+    method, checkpoint = cells(table, "GATv2 and PPO"), cells(table, "GATv2 and PPO: seed 0")
+    assert method["± over"] == "2 seeds" and method["coverage at 500"].strip("*") == "85.0 ± 5.0"
+    assert checkpoint["± over"] == "2 arenas" and checkpoint["coverage at 500"] == "80.0 ± 1.0"
+
+
+@pytest.mark.parametrize(
+    ("value", "share", "kind", "text"),
+    [
+        (Interval(0.81, 0.80, 0.82), 0.80, "≥", "yes"),
+        (Interval(0.79, 0.77, 0.81), 0.80, "≥", "within the interval"),
+        (Interval(0.75, 0.74, 0.76), 0.80, "≥", "no: −5.0"),
+        (Interval(0.05, 0.04, 0.06), 0.10, "≤", "yes"),
+        (Interval(0.12, 0.11, 0.13), 0.10, "≤", "no: +2.0"),
+        (Interval(0.90, 0.89, 0.91), 0.88, "", "no: +2.0"),
+        (Interval(0.88), 0.90, "≥", "no: −2.0"),
+    ],
+)
+def test_verdicts(value, share, kind, text):
+    assert verdict(value, share, kind) == text
+
+
+def test_reproduction_lists_what_was_measured_only(tmp_path):
+    write_evaluation(tmp_path, coverage=(0.9, 0.8))
+    write_evaluation(tmp_path, "trees75", coverage=(0.9, 0.9), rate=0.3)
+    table = reproduction(read_results(tmp_path), "learned")
+    assert cells(table, "GATv2 and PPO: coverage at 1000 steps") == {
+        "statement of the paper (%)": "GATv2 and PPO: coverage at 1000 steps",
+        "paper": "≥ 80",
+        "here": "85.0 ± 1.0",
+        "± over": "2 arenas",
+        "reached": "yes",
+    }
+    assert cells(table, "75 trunks: interventions, mean")["reached"] == "no: +10.0"
+    assert "h = 75" not in table and "MMPF" not in table
+
+
+def test_paired_differences_are_marked_by_who_is_ahead(tmp_path):
+    write_evaluation(tmp_path, coverage=(0.9, 0.7), rate=0.1)
+    write_evaluation(tmp_path, name="random", coverage=(0.5, 0.3), rate=0.0)
+    row = cells(differences(read_results(tmp_path), "learned"), "random walk")
+    assert row["arenas"] == "2" and row["coverage at the end"] == "**+40.0 ± 0.0**"
+    assert row["interventions"] == "*+10.0 ± 0.0*"
+    assert row["area to 500"] == "–"  # no such column in episodes.csv
+    assert row["steps to 98 %"] == "0 (2)"
+
+
+def test_policies_in_other_arenas_are_not_paired(tmp_path):
+    write_evaluation(tmp_path)
+    other = write_evaluation(tmp_path, name="random") / "summary.json"
+    other.write_text(other.read_text().replace('"seed": 0', '"seed": 1'))
+    assert differences(read_results(tmp_path), "learned") == ""
+
+
+def test_other_forests(tmp_path):
+    write_evaluation(tmp_path)
+    write_evaluation(tmp_path, "size75", coverage=(0.6, 0.6))
+    table = forests(read_results(tmp_path))
+    assert len(table.splitlines()) == 3
+    row = cells(table, "h = 75, 101 trunks")
+    assert row["coverage at the end"] == "60.0 ± 1.0" and row["coverage at 5000"] == "–"
+    assert not math.isnan(float(row["steps"]))
