@@ -66,7 +66,12 @@ class ForestEnv(EnvBase):
         _check("size", size, size >= SMALLEST_SIZE, f"at least {SMALLEST_SIZE}")
         _check("n_trees", n_trees, n_trees >= 0, "0 or more")
         ordered = len(tree_radius) == 2 and 0 < tree_radius[0] <= tree_radius[1]
-        _check("tree_radius", list(tree_radius), ordered, "[smallest, largest] with 0 < smallest <= largest")
+        _check(
+            "tree_radius",
+            list(tree_radius),
+            ordered,
+            "[smallest, largest] with 0 < smallest <= largest",
+        )
         in_sight = lidar_range >= math.sqrt(2)
         _check("lidar_range", lidar_range, in_sight, "at least 1.415: the 8 neighbours are seen")
         _check("coverage_goal", coverage_goal, 0 < coverage_goal <= 1, "in (0, 1]")

@@ -16,6 +16,7 @@ from torchrl.envs import EnvBase
 from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.evaluation.arenas import draw_arenas, uniforms
+from forestrl.evaluation.endings import end_reason
 
 _NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
@@ -48,6 +49,8 @@ class Episodes:
     """Steps in which the executed action was to stay, ``[n]``."""
     truncated_graphs: NDArray[np.int32]
     """Observations with more frontier cells than the graph has room for, ``[n]``."""
+    ending: NDArray[np.int8]
+    """Why the episode ended, a ``Reason``, ``[n]``: COVERED where the coverage goal was reached."""
 
     def __len__(self) -> int:
         return len(self.index)
@@ -172,7 +175,8 @@ def _run(
         record.add(step, td)
         td = env.step_mdp(td)
         tell(step + 1)
-    return record.episodes(np.asarray(indices, dtype=np.int64), td)
+    goal = getattr(env, "base_env", env).coverage_goal
+    return record.episodes(np.asarray(indices, dtype=np.int64), td, goal)
 
 
 class _Record:
@@ -205,8 +209,10 @@ class _Record:
         if (frontiers := td.get(K.FRONTIERS, None)) is not None:
             counts["truncated"] += frontiers.squeeze(-1) > td[K.WAYPOINT].shape[-1]
 
-    def episodes(self, index: NDArray[np.int64], last: TensorDictBase) -> Episodes:
+    def episodes(self, index: NDArray[np.int64], last: TensorDictBase, goal: float) -> Episodes:
         """Gives the record as arrays; ``last`` is the state after the last step."""
+        exploring = torch.zeros_like(self.counts["collisions"], dtype=torch.int8)
+        reason = last.get(K.REASON, exploring)
         free = ~last[K.TREES]
         known = (free & (last[K.CELLS] == F.Cell.FREE)).sum((-2, -1))
         length = self.counts["straight"] + 2**0.5 * self.counts["diagonal"]
@@ -219,6 +225,7 @@ class _Record:
             free_share=_array(known / free.sum((-2, -1))),
             null_actions=_array(self.counts["null_actions"]),
             truncated_graphs=_array(self.counts["truncated"]),
+            ending=_array(end_reason(reason, (self.coverage >= goal).any(0))),
         )
 
 

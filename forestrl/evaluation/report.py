@@ -17,6 +17,7 @@ from scipy import stats
 
 from forestrl.evaluation.episodes import Episodes
 from forestrl.evaluation.plots import coverage_png, interventions_png
+from forestrl.kernels.planning import Reason
 from forestrl.paper import INTERVENTION_LIMIT
 from forestrl.storage import atomic_write
 
@@ -95,6 +96,10 @@ def summarize(episodes: Episodes) -> dict[str, Any]:
         "null_actions": _mean(episodes.null_actions),
         "path_length": _mean(episodes.path_length),
         "truncated_graphs": int(episodes.truncated_graphs.sum()),
+        "endings": {
+            Reason(ending).name.lower(): float((episodes.ending == ending).mean())
+            for ending in np.unique(episodes.ending)
+        },
     }
 
 
@@ -138,6 +143,7 @@ def _episode_rows(episodes: Episodes) -> Iterable[Sequence[Any]]:
         "null_actions": episodes.null_actions,
         "collisions": episodes.collisions,
         "path_length": episodes.path_length,
+        "ending": [Reason(ending).name.lower() for ending in episodes.ending],
     }
     return [tuple(columns), *zip(*columns.values(), strict=True)]
 
@@ -180,6 +186,8 @@ def table(summary: Mapping[str, Any]) -> str:
         ("path length, cells", _line(summary["path_length"])),
         ("collisions", f"{summary['collisions']:6d}"),
     ]
+    for ending, share in summary["endings"].items():
+        rows.append((f"ended: {ending.replace('_', ' ')}", f"{100 * share:6.1f} % of runs"))
     if summary["truncated_graphs"]:
         rows.append(("graphs cut off", f"{summary['truncated_graphs']:6d}"))
     size = f"{summary['arenas']} arenas, {summary['steps']} steps; [95 % interval of the mean]"

@@ -1,0 +1,36 @@
+"""The random walk."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+
+from forestrl import functional as F
+from forestrl import keys as K
+
+
+class RandomWalk(TensorDictModuleBase):
+    """Draws every action uniformly.
+
+    Reads ``"uniform"``, the draw, and the agent's map; writes ``"action"``.
+
+    Args:
+        feasible_only: draw among the feasible moves (staying in place if there is none) instead of
+            all nine actions.
+    """
+
+    def __init__(self, feasible_only: bool = True) -> None:
+        self.in_keys = [K.CELLS, K.POSITION, K.UNIFORM]
+        self.out_keys = [K.ACTION]
+        super().__init__()
+        self.feasible_only = feasible_only
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Writes the action."""
+        weight = F.feasible(tensordict[K.CELLS], tensordict[K.POSITION]).float()
+        if self.feasible_only:
+            weight[..., F.NULL_ACTION] = weight[..., 1:].sum(-1) == 0
+        else:
+            weight = torch.ones_like(weight)
+        return tensordict.set(K.ACTION, F.sample_action(weight, tensordict[K.UNIFORM]))
