@@ -11,6 +11,7 @@ from forestrl.policies.learned import ActorCritic
 from forestrl.policies.released import (
     FORMAT,
     POLICY_FILE,
+    RELEASED,
     CheckpointError,
     Policy,
     find_policy,
@@ -141,3 +142,15 @@ def test_a_policy_for_another_model_is_refused_by_the_field(name, own, other):
 
 def test_the_same_model_is_accepted():
     require_same(make_policy(), {**MODEL, "window": 7, "unknown": 1}, "mine")
+
+
+def test_the_released_policy_is_described_beside_it():
+    policy = load_policy(RELEASED)
+    described = json.loads(RELEASED.with_suffix(".json").read_text())
+    assert described == {
+        "model": policy.model,
+        "window": policy.window,
+        "training": policy.training,
+    }
+    assert policy.training["frames"] >= 100_000
+    assert (RELEASED.parent / "README.md").is_file()
