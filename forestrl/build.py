@@ -173,7 +173,7 @@ def _make_wandb(cfg: DictConfig, run_dir: Path, logger_id: str | None) -> WandbL
         config,
         project=cfg.logger.project,
         entity=cfg.logger.entity,
-        group=cfg.logger.group or (sweep.name if sweep else None),
+        group=cfg.logger.group or (sweep.name if sweep else job.runtime.choices.get("experiment")),
         job_type=job.job.name,
         name=",".join(overrides)[:120] or None,
         tags=[override[:64] for override in overrides],

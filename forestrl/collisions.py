@@ -16,7 +16,7 @@ from torchrl.envs import Compose, TransformedEnv
 from tqdm.auto import tqdm
 
 from forestrl import build
-from forestrl.command import command
+from forestrl.command import asked_for, command
 from forestrl.envs import ExplorationGraph, ForestEnv, SafetyFilter
 from forestrl.evaluation.episodes import evaluate
 from forestrl.policies.classical import RandomWalk
@@ -60,7 +60,12 @@ def main(cfg: DictConfig) -> int:
     folder = Path(HydraConfig.get().runtime.output_dir)
     build.prepare(cfg)
     build.make_output_folder(folder)
-    learned, _ = build.make_policy(cfg, set())
+    build.require_positive(cfg, "collisions.arenas", "collisions.steps")
+    if cfg.policy.name != "learned":
+        raise build.ConfigError(
+            f"policy={cfg.policy.name} is not allowed: the learned policy is compared with random"
+        )
+    learned, _ = build.make_policy(cfg, asked_for())
     policies = {"random": RandomWalk(feasible_only=False), "learned": learned}
     forests = [
         {"size": size, "n_trees": round(density * size**2 / 50**2)}

@@ -15,16 +15,15 @@ from forestrl import __version__, build
 from forestrl.command import asked_for, command
 from forestrl.evaluation.episodes import Episodes, evaluate
 from forestrl.evaluation.metrics import eval_metrics
+from forestrl.evaluation.picture import draw_episode
 from forestrl.evaluation.report import table, write_report
-
-PAPER_ARENA = {"size": 50, "n_trees": 45}
-"""The paper's numbers are drawn into the pictures of evaluations in these arenas only."""
+from forestrl.loggers import Logger
+from forestrl.paper import ARENA
 
 
 def run(cfg: DictConfig, policy: Any) -> Episodes:
     """Runs a policy on the test arenas of a configuration, with a bar in steps of all arenas."""
     settings = cfg.eval
-    build.require_positive(cfg, "eval.arenas", "eval.steps", "eval.batch")
     bar = tqdm(
         total=settings.arenas * settings.steps,
         unit="step",
@@ -48,8 +47,27 @@ def main(cfg: DictConfig) -> float:
     """Evaluates ``cfg.policy``; returns the mean coverage at the end, for sweepers."""
     folder = Path(HydraConfig.get().runtime.output_dir)
     build.prepare(cfg)
+    build.require_positive(cfg, "eval.arenas", "eval.steps", "eval.batch")
     build.make_output_folder(folder)
     policy, about = build.make_policy(cfg, asked_for())
+    logger = build.make_logger(cfg, folder)
+    failed = True
+    try:
+        episodes, summary = report(cfg, policy, about, folder)
+        if cfg.logger.name != "none":
+            log(cfg, policy, logger, folder, episodes, summary)
+        failed = False
+    finally:
+        logger.close(failed)
+    print(table(summary))
+    print(f"\nresults: {folder}")
+    return float(episodes.coverage[:, -1].mean())
+
+
+def report(
+    cfg: DictConfig, policy: Any, about: dict[str, Any], folder: Path
+) -> tuple[Episodes, dict[str, Any]]:
+    """Runs the policy and writes the report; returns the episodes and their summary."""
     episodes = run(cfg, policy)
     meta = {
         **about,
@@ -59,25 +77,37 @@ def main(cfg: DictConfig) -> float:
         "eval": OmegaConf.to_container(cfg.eval, resolve=True),
         "filter": cfg.safety.get("_target_") is not None,
     }
-    paper = all(cfg.env[name] == value for name, value in PAPER_ARENA.items())
-    summary = write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)
-    _log(cfg, folder, episodes)
-    print(table(summary))
-    print(f"\nresults: {folder}")
-    return float(episodes.coverage[:, -1].mean())
+    paper = all(cfg.env[name] == value for name, value in ARENA.items())
+    return episodes, write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)
 
 
-def _log(cfg: DictConfig, folder: Path, episodes: Episodes) -> None:
-    """Sends the report to a dashboard, if one is asked for."""
-    logger = build.make_logger(cfg, folder)
-    failed = True
-    try:
-        logger.log_metrics(eval_metrics(episodes), step=0)
-        logger.log_figure("eval/coverage_curve", folder / "coverage.png", step=0)
-        logger.log_figure("eval/interventions", folder / "interventions.png", step=0)
-        failed = False
-    finally:
-        logger.close(failed)
+def log(
+    cfg: DictConfig,
+    policy: Any,
+    logger: Logger,
+    folder: Path,
+    episodes: Episodes,
+    summary: dict[str, Any],
+) -> None:
+    """Sends the report to a dashboard, with an episode in the first arena."""
+    settings, picture = cfg.eval, folder / "episode.gif"
+    end = summary["coverage"][str(settings.steps)]
+    interval = {f"eval/coverage_{side}": end[side] for side in ("low", "high")}
+    known = {name: value for name, value in interval.items() if value is not None}
+    logger.log_metrics(eval_metrics(episodes) | known, step=0)
+    logger.log_figure("eval/coverage_curve", folder / "coverage.png", step=0)
+    logger.log_figure("eval/interventions", folder / "interventions.png", step=0)
+    logger.log_table("eval/episodes", folder / "episodes.csv")
+    draw_episode(
+        build.make_env(cfg, num_envs=1),
+        policy,
+        picture,
+        seed=settings.seed,
+        arena=settings.first,
+        steps=min(settings.steps, 500),
+        every=5,
+    )
+    logger.log_figure("eval/episode", picture, step=0)
 
 
 if __name__ == "__main__":

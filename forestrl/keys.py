@@ -1,4 +1,4 @@
-"""The TensorDict schema: every key once.
+"""The TensorDict schema: every key that two places share, once.
 
 Groups say whose knowledge an entry is. ``*B`` is the env's batch, ``h`` the arena side, ``M`` the
 room for frontier nodes.
@@ -27,7 +27,8 @@ room for frontier nodes.
 
 ``"reward"`` is n^e_t from ForestEnv and r_t (Eq. 6) after FrontierPotentialReward; ``"done"``,
 ``"terminated"`` (rho >= rho*), ``"truncated"`` (n_s >= n_s*), ``"logits"``, ``"action_log_prob"``,
-``"state_value"``, ``"advantage"`` and ``"value_target"`` keep TorchRL's names.
+``"state_value"``, ``"advantage"``, ``"value_target"``, ``"episode_reward"`` keep TorchRL's names.
+Training adds ``"horizon"``; planners keep what they remember under ``"planner"``.
 """
 
 TREES = ("arena", "trees")

@@ -1,4 +1,4 @@
-"""Where metrics go: a CSV file always, and a dashboard if one is asked for."""
+"""Where metrics go: a CSV file, and a dashboard beside it if one is asked for."""
 
 from __future__ import annotations
 
@@ -21,6 +21,9 @@ class Logger(Protocol):
     def log_figure(self, name: str, path: Path, step: int) -> None:
         """Takes a picture or an animation from a file."""
 
+    def log_table(self, name: str, path: Path) -> None:
+        """Takes a table from a CSV file."""
+
     def log_policy(self, path: Path, aliases: Sequence[str]) -> None:
         """Takes a policy file, to be found again by its aliases."""
 
@@ -36,6 +39,9 @@ class NoLogger:
 
     def log_figure(self, name: str, path: Path, step: int) -> None:
         """Ignores the picture."""
+
+    def log_table(self, name: str, path: Path) -> None:
+        """Ignores the table."""
 
     def log_policy(self, path: Path, aliases: Sequence[str]) -> None:
         """Ignores the policy."""
@@ -84,7 +90,7 @@ class CsvLogger(NoLogger):
 
 
 class TensorboardLogger(NoLogger):
-    """Writes TensorBoard event files."""
+    """Writes the scalars as TensorBoard event files; pictures stay in the run folder."""
 
     def __init__(self, folder: Path) -> None:
         from torch.utils.tensorboard import SummaryWriter
@@ -139,6 +145,12 @@ class WandbLogger(NoLogger):
         )
         self.run.log({"frames": step, name: media})
 
+    def log_table(self, name: str, path: Path) -> None:
+        """Adds a table, a row a line of the file."""
+        with path.open(newline="") as file:
+            head, *rows = csv.reader(file)
+        self.run.log({name: self.wandb.Table(columns=list(head), data=rows)})
+
     def log_policy(self, path: Path, aliases: Sequence[str]) -> None:
         """Adds the policy as an artifact."""
         artifact = self.wandb.Artifact(f"policy-{self.run.id}", type="model")
@@ -178,6 +190,11 @@ class Loggers:
         """Passes the picture on."""
         for logger in self.loggers:
             logger.log_figure(name, path, step)
+
+    def log_table(self, name: str, path: Path) -> None:
+        """Passes the table on."""
+        for logger in self.loggers:
+            logger.log_table(name, path)
 
     def log_policy(self, path: Path, aliases: Sequence[str]) -> None:
         """Passes the policy on."""

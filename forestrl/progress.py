@@ -32,6 +32,7 @@ class Progress:
             initial=start,
             unit="frame",
             unit_scale=True,
+            smoothing=0,
             disable=not sys.stderr.isatty(),
         )
         self.began = self.last_line = time.monotonic()

@@ -76,7 +76,7 @@ class Training:
                 metrics |= self.evaluate(logger)
             logger.log_metrics(metrics, step=self.frames)
             bar.update(self.frames, metrics)
-            if self._due(self.cfg.checkpoint_every):
+            if self._due(self.cfg.checkpoint_every) or self.frames >= self.total_frames:
                 self.save("latest", logger)
         return metrics
 
@@ -141,7 +141,10 @@ def _timing(batch: TensorDictBase, collect: float, update: float) -> dict[str, f
 
 
 def resumed(cfg: DictConfig) -> DictConfig:
-    """Gives the configuration of the run to go on with; what was asked for now wins."""
+    """Gives the configuration of the run to go on with; what was asked for now wins.
+
+    The seed does not: the sources of randomness go on where they were.
+    """
     path = Path(str(cfg.resume)) / ".hydra" / "config.yaml"
     if not path.is_file():
         raise FileNotFoundError(f"resume={cfg.resume} is not a run folder: {path} does not exist")

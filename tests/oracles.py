@@ -34,7 +34,7 @@ def neighbours(grid: Grid, cell: Cell) -> list[Cell]:
     return [other for other in around if inside(grid, other)]
 
 
-# Section 1: the LiDAR.
+# Sec. II-A: the LiDAR.
 
 
 def sight_line(offset: Cell) -> list[Cell]:
@@ -61,7 +61,7 @@ def scan(trees: Grid, position: Cell, lidar_range: float) -> set[Cell]:
     return seen
 
 
-# Section 1: actions and the safety filter.
+# Sec. II-A: actions and the safety filter.
 
 
 def feasible(cells: Grid, position: Cell) -> list[bool]:
@@ -78,7 +78,7 @@ def safe_action(action: int, feasible_actions: list[bool]) -> int:
     return min(candidates, key=lambda i: (abs(i - action), i)) if candidates else 0
 
 
-# Section 1: components, and the paths through them.
+# Sec. II-A: components, and the paths through them.
 
 
 def path_lengths(free: Grid, source: Cell) -> dict[Cell, int]:
@@ -112,7 +112,7 @@ def coverage(cells: Grid, traversable: set[Cell]) -> float:
     return sum(cells[row][col] == FREE for row, col in traversable) / len(traversable)
 
 
-# Section 2: the exploration graph.
+# Sec. II-B: the exploration graph.
 
 
 def frontier(cells: Grid) -> set[Cell]:
@@ -179,7 +179,7 @@ def graph(
     return x, {(u, v): math.dist(u[1:], v[1:]) / lidar_range for u, v in pairs}
 
 
-# Section 4: the reward.
+# Sec. II-D: the reward.
 
 
 def potential(cells: Grid, position: Cell, *, side: int, beta: float) -> float:

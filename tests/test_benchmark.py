@@ -17,6 +17,7 @@ from forestrl.benchmark.timing import measure
 from forestrl.envs import ForestEnv
 
 ROOT = Path(__file__).resolve().parents[1]
+DECISIONS = ("decision", "decision + filter", "graph to filter")
 PIPELINE = [
     "env step",
     "+ filter",
@@ -60,7 +61,7 @@ def result(tmp_path_factory):
 def test_every_stage_is_there_for_every_number_of_arenas(result):
     rows = result[2]
     whole = {*PIPELINE, "train iteration", "evaluation step"}
-    for num_envs, stages in (("1", {*whole, "decision", "decision + filter"}), ("4", whole)):
+    for num_envs, stages in (("1", {*whole, *DECISIONS}), ("4", whole)):
         assert {row["stage"] for row in rows if row["num_envs"] == num_envs} == stages
     assert {(row["size"], row["n_trees"]) for row in rows} == {("20", "7")}
 

@@ -83,7 +83,7 @@ def _measure_learning(
     batch = next(collected)  # the first of a process also compiles
     advantage = measure({"": stages.advantage(ppo, batch)}, seconds)[""]
     minibatch = measure({"": stages.minibatch(ppo, batch)}, seconds)[""]
-    minibatches = ppo.num_epochs * ppo.frames_per_batch // ppo.minibatches.batch_size
+    minibatches = ppo.num_epochs * ppo.frames_per_batch // ppo.minibatch_size
     update = advantage.median + minibatches * minibatch.median
     short = update <= LONG_UPDATE * seconds
     iteration = _measure_iteration(ppo, collected, None if short else update, seconds)
@@ -91,7 +91,7 @@ def _measure_learning(
     how = "measured" if short else "estimated"
     return {
         names[0]: blank.timed(names[0], ppo.frames_per_batch, advantage),
-        names[1]: blank.timed(names[1], ppo.minibatches.batch_size, minibatch),
+        names[1]: blank.timed(names[1], ppo.minibatch_size, minibatch),
         names[2]: blank.timed(names[2], ppo.frames_per_batch, iteration, how),
     }
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from forestrl.benchmark.rows import Row
-from forestrl.benchmark.stages import DECISION, ITERATION, SAFE_DECISION
+from forestrl.benchmark.stages import DECISION, ITERATION, MAP_DECISION, SAFE_DECISION
 from forestrl.storage import atomic_write
 
-_DECISIONS = (DECISION, SAFE_DECISION)
+_DECISIONS = (DECISION, SAFE_DECISION, MAP_DECISION)
 _NAME, _CELL = 18, 15  # widths of columns
 
 

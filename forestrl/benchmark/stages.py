@@ -13,7 +13,8 @@ Beside it stand **train iteration**, which is collecting a batch (with resets, s
 and TorchRL's collector) and the whole update; **evaluation step**, which is policy, env step and
 the passage to the next state, without the record kept of it; and **decision**, from one graph to
 one action without gradient or TensorDict, alone and with the filter's feasible actions and
-Algorithm 1 behind it.
+Algorithm 1 behind it; **graph to filter** also builds the graph from the map, which is all that a
+robot does for a step.
 """
 
 from __future__ import annotations
@@ -31,8 +32,10 @@ from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from forestrl import functional as F
+from forestrl import kernels
 from forestrl import keys as K
 from forestrl.benchmark.states import enter
+from forestrl.envs import ExplorationGraph
 from forestrl.learning.ppo import PPO
 from forestrl.policies.learned import ActorCritic
 
@@ -44,6 +47,7 @@ LEARNING = (POLICY, ADVANTAGE, MINIBATCH)
 """The pipeline's stages behind those of the envs."""
 ITERATION, EVALUATION = "train iteration", "evaluation step"
 DECISION, SAFE_DECISION = "decision", "decision + filter"
+MAP_DECISION = "graph to filter"
 
 
 @dataclass(frozen=True)
@@ -107,7 +111,7 @@ def minibatch(ppo: PPO, batch: TensorDictBase) -> Call:
     """Draws one minibatch and learns from it."""
     ppo.estimate_advantage(batch)
     ppo.fill(batch)
-    return lambda: ppo.step(ppo.minibatches.sample())
+    return lambda: ppo.step(ppo.shuffled.sample(ppo.minibatch_size))
 
 
 def start_collecting(collector: Collector, worlds: TensorDict) -> None:
@@ -123,6 +127,7 @@ def decision(parts: Parts, worlds: Sequence[TensorDict]) -> dict[str, Call]:
         worlds: one arena each.
     """
     graphs = [tuple(state[key][0] for key in K.GRAPH) for state in _graphs(parts, worlds)]
+    (observe,) = (t for t in parts.evaluation.transform if isinstance(t, ExplorationGraph))
     maps = [(world["cells"][0], world["position"][0]) for world in worlds]
 
     @torch.no_grad()
@@ -133,8 +138,21 @@ def decision(parts: Parts, worlds: Sequence[TensorDict]) -> dict[str, Call]:
         graph, (cells, position) = given
         return F.safe_action(decide(graph), F.feasible(cells, position))
 
+    def decide_from_map(given: tuple[Tensor, Tensor]) -> Tensor:
+        graph = kernels.exploration_graph(
+            *given,
+            window=observe.window,
+            max_frontiers=observe.max_frontiers,
+            lidar_range=observe.lidar_range,
+        )
+        return decide_safely((graph, given))
+
     together = list(zip(graphs, maps, strict=True))
-    return {DECISION: _in_turn(decide, graphs), SAFE_DECISION: _in_turn(decide_safely, together)}
+    return {
+        DECISION: _in_turn(decide, graphs),
+        SAFE_DECISION: _in_turn(decide_safely, together),
+        MAP_DECISION: _in_turn(decide_from_map, maps),
+    }
 
 
 def _graphs(parts: Parts, worlds: Sequence[TensorDict]) -> list[TensorDictBase]:

@@ -13,11 +13,11 @@ _HORIZON = "horizon"
 
 
 class StaggeredEpisodes(Transform):
-    """Cuts training episodes short, the first ones at staggered times.
+    """Cuts training episodes, the first ones at staggered times.
 
-    An episode is truncated after ``steps`` steps, so that many forests are seen; the first episode
-    of every arena is cut at a time drawn uniformly, so that the arenas of a batch are in all
-    phases of exploration from the start. The horizon travels in the TensorDict under
+    An episode is truncated after ``steps`` steps, by default the env's own budget; the first
+    episode of every arena is cut at a time drawn uniformly, so that the arenas of a batch are in
+    all phases of exploration from the start. The horizon travels in the TensorDict under
     ``"horizon"``, int64 ``[*B, 1]``.
 
     Args:

@@ -137,6 +137,8 @@ class FrontierPotentialReward(Transform):
         coverage_goal: ``rho*``, the coverage that earns ``r_explored``.
         r_explored: ``r_exp``.
         r_unsafe: ``r_sigma``.
+        shaping: whether the change of the potential is added; without it the potential is only
+            reported.
 
     Raises:
         ValueError: if ``beta`` is negative, or ``window`` even or not positive.
@@ -149,13 +151,14 @@ class FrontierPotentialReward(Transform):
         coverage_goal: float = 0.98,
         r_explored: float = 100.0,
         r_unsafe: float = -5.0,
+        shaping: bool = True,
     ) -> None:
         if beta < 0:
             raise ValueError(f"beta={beta} is not allowed: it must be 0 or more")
         check_window(window)
         super().__init__(in_keys=[K.CELLS, K.POSITION, "reward"], out_keys=[K.POTENTIAL, "reward"])
         self.beta, self.window, self.coverage_goal = beta, window, coverage_goal
-        self.r_explored, self.r_unsafe = r_explored, r_unsafe
+        self.r_explored, self.r_unsafe, self.shaping = r_explored, r_unsafe, shaping
 
     def _potential(self, tensordict: TensorDictBase) -> Tensor:
         return kernels.potential(
@@ -179,7 +182,7 @@ class FrontierPotentialReward(Transform):
         next_tensordict["reward"] = F.reward(
             next_tensordict[K.NEW_CELLS],
             potential,
-            next_tensordict[K.POTENTIAL],
+            next_tensordict[K.POTENTIAL] if self.shaping else potential,
             explored=next_tensordict[K.COVERAGE] >= self.coverage_goal,
             unsafe=unsafe,
             r_explored=self.r_explored,

@@ -1,4 +1,4 @@
-"""Compiled CPU versions of the functions that are called at every step.
+"""Compiled CPU versions of the functions that look at whole maps at every step.
 
 Each has the signature of the torch function of the same name in :mod:`forestrl.functional`, which
 stays the reference, the version for other devices, and what the tests compare it with. Callers

@@ -192,16 +192,6 @@ def spread(typing_context, vector, lanes) -> tuple:
 
 
 @intrinsic
-def first(typing_context, vector) -> tuple:
-    """The first lane as a scalar."""
-
-    def build(context, builder, signature, args):
-        return builder.extract_element(args[0], ir.Constant(_INT, 0))
-
-    return vector.dtype(vector), build
-
-
-@intrinsic
 def exp(typing_context, vector) -> tuple:
     """The exponential: 1e-7 relative in float32 within [-87, 88], clamped there; libm otherwise."""
 

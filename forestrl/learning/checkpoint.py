@@ -59,7 +59,10 @@ def restore_training(state: dict[str, Any], ppo: PPO, collector: Collector) -> d
             f"the training to go on with had arenas {list(before)}, these are {list(now)}: leave "
             "env.size and env.num_envs as they were"
         )
+    rates = [group["lr"] for group in ppo.optimizer.param_groups]  # may have been asked for anew
     ppo.optimizer.load_state_dict(state["optimizer"])
+    for group, rate in zip(ppo.optimizer.param_groups, rates, strict=True):
+        group["lr"] = rate
     torch.set_rng_state(state["rng"])
     collector.env.base_env.rng.set_state(state["env_rng"])
     collector._carrier.update(arenas)

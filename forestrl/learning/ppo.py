@@ -90,14 +90,16 @@ class PPO:
             entropy_bonus=True,
             entropy_coeff=entropy_coeff,
             loss_critic_type="l2",
+            log_explained_variance=False,
             functional=False,
         )
         self.parameters = [*actor.parameters(), *critic.parameters()]
         self.optimizer = torch.optim.Adam(self.parameters, lr=lr, fused=True)
-        self.minibatches = TensorDictReplayBuffer(
+        self.minibatch_size = frames_per_batch // num_minibatches
+        self.shuffled = TensorDictReplayBuffer(  # a sample is the whole batch in another order
             storage=LazyTensorStorage(frames_per_batch),
             sampler=SamplerWithoutReplacement(),
-            batch_size=frames_per_batch // num_minibatches,
+            batch_size=frames_per_batch,
         )
 
     def update(self, batch: TensorDictBase) -> dict[str, float]:
@@ -113,7 +115,7 @@ class PPO:
         self.fill(batch)
         measured = []
         for _ in range(self.num_epochs):
-            for minibatch in self.minibatches:
+            for minibatch in self.shuffled.sample().split(self.minibatch_size):
                 measured.append(self.step(minibatch))
         means = torch.stack(measured).mean(0).tolist()
         metrics = dict(zip(_MEASURED.values(), means, strict=True))
@@ -140,9 +142,9 @@ class PPO:
         return self.critic(states.select(*K.GRAPH))["state_value"]
 
     def fill(self, batch: TensorDictBase) -> None:
-        """Makes a batch with advantages the one that ``minibatches`` draws from."""
-        self.minibatches.empty()
-        self.minibatches.extend(batch.select(*_LEARNT_FROM).reshape(-1))
+        """Makes a batch with advantages the one that is shuffled."""
+        self.shuffled.empty()
+        self.shuffled.extend(batch.select(*_LEARNT_FROM).reshape(-1))
 
     def step(self, minibatch: TensorDictBase) -> Tensor:
         """Takes one Adam step; returns what ``_MEASURED`` lists, float32 ``[n]``."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterable
 
 import torch
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule, TensorDictSequential
 from torch import Tensor, nn
 from torch.distributions import Categorical
@@ -12,13 +13,31 @@ from torchrl.modules import ProbabilisticActor
 
 from forestrl import functional as F
 from forestrl import keys as K
-from forestrl.policies.gatv2 import Critic, GATv2Encoder
+from forestrl.policies.gatv2 import Critic, GATv2Encoder, Kernel, Readout
 
-Kernel = Literal["fused", "pyg"]
+
+class Bound(TensorDictModule):
+    """Binds a function of tensors to keys, as its parent does, but without looking at the outputs.
+
+    The parent allows for outputs that are no tensors, and for that searches the disk for another
+    library at every call, which takes as long as a small network.
+    """
+
+    def _write_to_tensordict(
+        self,
+        tensordict: TensorDictBase,
+        tensors: Iterable[Tensor],
+        tensordict_out: TensorDictBase | None = None,
+        out_keys: Iterable[str] | None = None,
+    ) -> TensorDictBase:
+        written = tensordict if tensordict_out is None else tensordict_out
+        for key, value in zip(out_keys or self.out_keys, tensors, strict=True):
+            written.set(key, value)
+        return written
 
 
 class ActorCritic(nn.Module):
-    """The two networks of section 3, of the same shape and with their own weights.
+    """The two networks of Table II, of the same shape and with their own weights.
 
     Args:
         hidden: channels a head of the first layer (Table II).
@@ -32,7 +51,7 @@ class ActorCritic(nn.Module):
         self,
         hidden: int = 16,
         heads: int = 4,
-        critic_readout: Literal["mean", "concat"] = "mean",
+        critic_readout: Readout = "mean",
         kernel: Kernel = "fused",
         lidar_range: float = 5.0,
     ) -> None:
@@ -47,7 +66,7 @@ class ActorCritic(nn.Module):
     def make_actor(self) -> ProbabilisticActor:
         """Binds the actor for PPO: samples ``"action"`` and writes its log-probability."""
         return ProbabilisticActor(
-            TensorDictModule(self.actor, in_keys=list(K.GRAPH), out_keys=[K.LOGITS]),
+            Bound(self.actor, in_keys=list(K.GRAPH), out_keys=[K.LOGITS]),
             in_keys=[K.LOGITS],
             distribution_class=Categorical,
             return_log_prob=True,
@@ -55,7 +74,7 @@ class ActorCritic(nn.Module):
 
     def make_critic(self) -> TensorDictModule:
         """Binds the critic for PPO: writes ``"state_value"``."""
-        return TensorDictModule(self.critic, in_keys=list(K.GRAPH), out_keys=["state_value"])
+        return Bound(self.critic, in_keys=list(K.GRAPH), out_keys=["state_value"])
 
     def make_policy(self, deterministic: bool = False) -> TensorDictSequential:
         """Binds the policy for use: writes ``"logits"`` and ``"action"``.
@@ -64,11 +83,11 @@ class ActorCritic(nn.Module):
             deterministic: take the most probable action instead of sampling with ``"uniform"``.
         """
         choose = (
-            TensorDictModule(_mode, in_keys=[K.LOGITS], out_keys=[K.ACTION])
+            Bound(_mode, in_keys=[K.LOGITS], out_keys=[K.ACTION])
             if deterministic
-            else TensorDictModule(_sample, in_keys=[K.LOGITS, K.UNIFORM], out_keys=[K.ACTION])
+            else Bound(_sample, in_keys=[K.LOGITS, K.UNIFORM], out_keys=[K.ACTION])
         )
-        network = TensorDictModule(self.actor, in_keys=list(K.GRAPH), out_keys=[K.LOGITS])
+        network = Bound(self.actor, in_keys=list(K.GRAPH), out_keys=[K.LOGITS])
         return TensorDictSequential(network, choose)
 
 

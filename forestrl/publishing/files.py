@@ -39,8 +39,11 @@ def read_summary(path: Path) -> dict[str, Any]:
     return summary
 
 
+_WORDS = ("ending",)
+
+
 def read_columns(path: Path, needed: tuple[str, ...]) -> dict[str, NDArray[np.float64]]:
-    """Reads a CSV file of numbers; empty fields become nan.
+    """Reads the numbers of a CSV file; empty fields become nan, columns of words are left out.
 
     Raises:
         ResultError: if it is missing or empty, lacks a column, or holds something else.
@@ -49,17 +52,18 @@ def read_columns(path: Path, needed: tuple[str, ...]) -> dict[str, NDArray[np.fl
     head = next(reader, [])
     if missing := [name for name in needed if name not in head]:
         raise ResultError(f"{path} lacks the column {', '.join(missing)}")
+    columns = [column for column, name in enumerate(head) if name not in _WORDS]
     rows = []
     for number, row in enumerate(reader, start=2):
-        try:
-            rows.append([float(field or "nan") for field in row])
-        except ValueError as error:
-            raise ResultError(f"{path}, line {number}: {error}") from error
         if len(row) != len(head):
             raise ResultError(f"{path}, line {number}: {len(row)} fields instead of {len(head)}")
+        try:
+            rows.append([float(row[column] or "nan") for column in columns])
+        except ValueError as error:
+            raise ResultError(f"{path}, line {number}: {error}") from error
     if not rows:
         raise ResultError(f"{path} has no rows")
-    return dict(zip(head, np.array(rows).T, strict=True))
+    return dict(zip([head[column] for column in columns], np.array(rows).T, strict=True))
 
 
 def _has(tree: Any, names: list[str]) -> bool:
