@@ -38,7 +38,7 @@ SWEEPS = {
     ],
 }
 EXEMPT = {"num_envs", "seed", "device"}
-VARIANTS = {("env", "tiny"), ("env", "forest75"), ("env", "forest100")}
+VARIANTS = {("env", "tiny"), ("env", "forest75"), ("env", "forest100"), ("reward", "coverage")}
 TWO_TINY_BATCHES = (
     "env.size=14",
     "env.n_trees=4",

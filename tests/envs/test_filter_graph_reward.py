@@ -222,3 +222,13 @@ def test_a_written_down_state_can_be_stepped_from():
     ours, theirs = step(env, td, 5), step(env, bare, 5)
     assert_same_state(ours, theirs)
     assert len(leaves(theirs)) == len(leaves(ours))
+
+
+def test_equation_6_without_shaping_leaves_the_new_cells():
+    plain, td = env_for(CORRIDOR, FrontierPotentialReward(shaping=False))
+    shaped, _ = env_for(CORRIDOR, FrontierPotentialReward())
+    for action in range(1, 9):
+        bare, whole = step(plain, td, action), step(shaped, td, action)
+        assert torch.equal(bare[K.POTENTIAL], whole[K.POTENTIAL])
+        if not bare[K.COLLISION] and not bare["terminated"]:
+            assert torch.equal(bare["reward"], bare[K.NEW_CELLS])
