@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from torchrl.envs import Compose, EnvBase, RewardSum, TransformedEnv
 from forestrl.envs import StaggeredEpisodes
 from forestrl.loggers import CsvLogger, Logger, Loggers, NoLogger, TensorboardLogger, WandbLogger
 from forestrl.policies.learned import ActorCritic
-from forestrl.policies.released import RELEASED, Policy, load_policy, require_same
+from forestrl.policies.released import RELEASED, Policy, find_policy, load_policy, require_same
 
 _ARCHITECTURE = ("hidden", "heads", "critic_readout", "lidar_range")
 
@@ -126,7 +127,8 @@ def make_policy(cfg: DictConfig, asked: set[str]) -> tuple[TensorDictModuleBase,
     """
     if cfg.policy.name != "learned":
         settings = {key: value for key, value in cfg.policy.items() if key != "name"}
-        return instantiate(settings), {"policy": cfg.policy.name}
+        options = {key: value for key, value in settings.items() if key != "_target_"}
+        return instantiate(settings), {"policy": cfg.policy.name, "options": options}
     path = Path(str(cfg.checkpoint)) if cfg.checkpoint is not None else RELEASED
     policy = load_policy(path)
     wanted = {**architecture(cfg), "window": cfg.graph.window}
@@ -136,6 +138,7 @@ def make_policy(cfg: DictConfig, asked: set[str]) -> tuple[TensorDictModuleBase,
     networks = policy.build(cfg.model.kernel, cfg.env.lidar_range).to(cfg.device)
     name = "released" if cfg.checkpoint is None else str(path)
     about = {"policy": "learned", "checkpoint": name, "training": policy.training}
+    about["sha256"] = hashlib.sha256(find_policy(path).read_bytes()).hexdigest()
     about["actions"] = "mode" if cfg.policy.deterministic else "sampled"
     return networks.make_policy(cfg.policy.deterministic), about
 

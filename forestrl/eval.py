@@ -15,13 +15,14 @@ from forestrl import __version__, build
 from forestrl.command import asked_for, command
 from forestrl.evaluation.episodes import Episodes, evaluate
 from forestrl.evaluation.metrics import eval_metrics
+from forestrl.evaluation.parts import Parts
 from forestrl.evaluation.picture import draw_episode
 from forestrl.evaluation.report import table, write_report
 from forestrl.loggers import Logger
 from forestrl.paper import ARENA
 
 
-def run(cfg: DictConfig, policy: Any) -> Episodes:
+def run(cfg: DictConfig, policy: Any, parts: Parts) -> Episodes:
     """Runs a policy on the test arenas of a configuration, with a bar in steps of all arenas."""
     settings = cfg.eval
     bar = tqdm(
@@ -39,13 +40,15 @@ def run(cfg: DictConfig, policy: Any) -> Episodes:
             steps=settings.steps,
             batch=settings.batch,
             progress=lambda done: bar.update(done - bar.n),
+            parts=parts,
         )
 
 
 @command("eval")
 def main(cfg: DictConfig) -> float:
     """Evaluates ``cfg.policy``; returns the mean coverage at the end, for sweepers."""
-    folder = Path(HydraConfig.get().runtime.output_dir)
+    output = HydraConfig.get().runtime.output_dir
+    folder = Path(output if cfg.resume is None else str(cfg.resume))
     build.prepare(cfg)
     build.require_positive(cfg, "eval.arenas", "eval.steps", "eval.batch")
     build.make_output_folder(folder)
@@ -68,17 +71,22 @@ def report(
     cfg: DictConfig, policy: Any, about: dict[str, Any], folder: Path
 ) -> tuple[Episodes, dict[str, Any]]:
     """Runs the policy and writes the report; returns the episodes and their summary."""
-    episodes = run(cfg, policy)
-    meta = {
+    settings = {
         **about,
-        "version": __version__,
-        "command": shlex.join(["forestrl", "eval", *HydraConfig.get().overrides.task]),
         "env": OmegaConf.to_container(cfg.env, resolve=True),
+        "graph": OmegaConf.to_container(cfg.graph, resolve=True),
         "eval": OmegaConf.to_container(cfg.eval, resolve=True),
         "filter": cfg.safety.get("_target_") is not None,
     }
+    parts = Parts(folder / "parts", settings)
+    episodes = run(cfg, policy, parts)
+    words = [word for word in HydraConfig.get().overrides.task if not word.startswith("resume=")]
+    command = shlex.join(["forestrl", "eval", *words])
+    meta = {**settings, "version": __version__, "command": command}
     paper = all(cfg.env[name] == value for name, value in ARENA.items())
-    return episodes, write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)
+    summary = write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)
+    parts.clear()
+    return episodes, summary
 
 
 def log(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -107,6 +107,16 @@ class Episodes:
         return cls(*(np.concatenate(column) for column in columns))
 
 
+class Kept(Protocol):
+    """Where finished chunks of an evaluation are kept."""
+
+    def load(self, indices: Sequence[int]) -> Episodes | None:
+        """Gives the episodes of a chunk, or None if they are not there."""
+
+    def save(self, episodes: Episodes) -> None:
+        """Keeps the episodes of a chunk."""
+
+
 def evaluate(
     env_factory: Callable[[int], EnvBase],
     policy: Callable[[TensorDictBase], TensorDictBase],
@@ -116,6 +126,7 @@ def evaluate(
     steps: int,
     batch: int,
     progress: Callable[[int], object] | None = None,
+    parts: Kept | None = None,
 ) -> Episodes:
     """Runs a policy on test arenas for the whole budget, past the coverage goal.
 
@@ -130,6 +141,7 @@ def evaluate(
         steps: steps of each episode.
         batch: arenas stepped at once.
         progress: told, after every step, how many steps are done, counted over all arenas.
+        parts: where finished chunks are kept and found again; None for nowhere.
 
     Returns:
         the episodes, in the order of ``indices``.
@@ -141,8 +153,12 @@ def evaluate(
         if value < 1:
             raise ValueError(f"{name}={value} is not allowed: at least 1 is needed")
     chunks = [indices[first : first + batch] for first in range(0, len(indices), batch)]
-    env, parts, done = env_factory(len(chunks[0])), [], 0
+    env, finished, done = env_factory(len(chunks[0])), [], 0
     for chunk in chunks:
+        if parts is not None and (kept := parts.load(chunk)) is not None:
+            finished.append(kept)
+            done += len(chunk) * steps
+            continue
         if env.batch_size != (len(chunk),):
             env = env_factory(len(chunk))
 
@@ -150,9 +166,11 @@ def evaluate(
             if progress is not None:
                 progress(done + step * size)
 
-        parts.append(_run(env, policy, seed=seed, indices=chunk, steps=steps, tell=tell))
+        finished.append(_run(env, policy, seed=seed, indices=chunk, steps=steps, tell=tell))
+        if parts is not None:
+            parts.save(finished[-1])
         done += len(chunk) * steps
-    return Episodes.concatenate(parts)
+    return Episodes.concatenate(finished)
 
 
 @torch.no_grad()
