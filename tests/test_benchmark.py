@@ -3,9 +3,6 @@
 import csv
 import json
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 import torch
@@ -15,8 +12,8 @@ from forestrl import keys as K
 from forestrl.benchmark.states import arrange, enter, explore
 from forestrl.benchmark.timing import measure
 from forestrl.envs import ForestEnv
+from tests.commands import forestrl
 
-ROOT = Path(__file__).resolve().parents[1]
 DECISIONS = ("decision", "decision + filter", "graph to filter")
 PIPELINE = [
     "env step",
@@ -39,10 +36,8 @@ TINY = [
 
 
 def bench(folder, *overrides):
-    """Runs ``forestrl bench`` in a process of its own, tiny unless said otherwise."""
-    code = "import sys; from forestrl.cli import main; main()"
-    command = [sys.executable, "-c", code, "bench", *TINY, *overrides, f"hydra.run.dir={folder}"]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    """Runs ``forestrl bench``, tiny unless said otherwise."""
+    return forestrl("bench", *TINY, *overrides, f"hydra.run.dir={folder}")
 
 
 def read(path):
@@ -54,8 +49,8 @@ def result(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
     scaling = ["bench.scaling_sizes=[20,30]", "bench.scaling_num_envs=[1,2]", "bench.scaling=true"]
     process = bench(folder, *scaling)
-    assert process.returncode == 0, process.stderr
-    return folder, process.stdout, read(folder / "bench.csv")
+    assert process.status == 0, process.err
+    return folder, process.out, read(folder / "bench.csv")
 
 
 def test_every_stage_is_there_for_every_number_of_arenas(result):
@@ -130,13 +125,8 @@ def test_scaling_has_a_row_for_every_stage_size_and_number_of_arenas(result):
 def test_another_network_no_filter_and_a_single_size_can_be_asked_for(tmp_path):
     chosen = ["model.kernel=pyg", "safety=none", "env.size=12", "env.n_trees=2", "env.num_envs=2"]
     chosen.append("bench.seconds=0.005")
-    process = subprocess.run(
-        [sys.executable, "-m", "forestrl.bench", *TINY[:4], *chosen, f"hydra.run.dir={tmp_path}"],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-    )
-    assert process.returncode == 0, process.stderr
+    result = forestrl("bench", *TINY[:4], *chosen, f"hydra.run.dir={tmp_path}")
+    assert result.status == 0, result.err
     rows = read(tmp_path / "bench.csv")
     assert {(row["size"], row["num_envs"]) for row in rows} == {("12", "1"), ("12", "2")}
     assert "+ filter" not in {row["stage"] for row in rows}
@@ -155,8 +145,8 @@ def test_another_network_no_filter_and_a_single_size_can_be_asked_for(tmp_path):
 )
 def test_bad_settings_end_with_one_line(override, words, tmp_path):
     process = bench(tmp_path, override)
-    assert process.returncode == 1
-    (line,) = process.stderr.splitlines()
+    assert process.status == 1
+    (line,) = process.err.splitlines()
     assert line.startswith("forestrl bench: ") and words in line
     assert not list(tmp_path.glob("*.csv"))
 

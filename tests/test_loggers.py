@@ -11,7 +11,7 @@ from omegaconf import OmegaConf
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from forestrl.loggers import CsvLogger, Loggers, NoLogger, TensorboardLogger
-from tests.commands import forestrl, train
+from tests.commands import forestrl, rows, train
 
 ROLLOUT = "return coverage episode_length steps_to_80 steps_to_90 steps_to_98 finished"
 EVAL = "coverage auc steps_to_80 steps_to_95 steps_to_98 intervention_rate collisions"
@@ -200,3 +200,18 @@ def test_wandb_run_that_fails_is_finished_as_failed(dashboard, tmp_path):
     assert result.status == 1
     summary = json.loads(inspect(tmp_path, "--summary"))
     assert (summary["state"], summary["exit_code"]) == ("failed", 1)
+
+
+def test_wandb_of_an_evaluation_has_intervals_episodes_and_a_picture(tmp_path, monkeypatch):
+    monkeypatch.setenv("WANDB_MODE", "offline")
+    monkeypatch.setenv("WANDB_SILENT", "true")
+    options = ("env=tiny", "eval.arenas=3", "eval.steps=12", "logger=wandb")
+    result = forestrl("eval", *options, f"hydra.run.dir={tmp_path}")
+    assert result.status == 0, result.err
+    assert (tmp_path / "metrics.csv").is_file() and (tmp_path / "episode.gif").is_file()
+    (media,) = tmp_path.glob("wandb/offline-run-*/files/media")
+    kinds = {path.suffix for path in media.rglob("*") if path.is_file()}
+    assert {".gif", ".png", ".json"} <= kinds
+    (metrics,) = rows(tmp_path / "metrics.csv")
+    low, mean, high = (float(metrics[f"eval/coverage{end}"]) for end in ("_low", "", "_high"))
+    assert low <= mean <= high

@@ -7,7 +7,7 @@ The pipeline of a training is, in this order:
   a whole; what a stage adds is the difference to the one before;
 * **policy forward**: the actor on the graphs, with the sampled action and its log-probability;
 * **GAE**: the critic on a whole batch and its last states, then the advantages;
-* **PPO minibatch**: drawing a minibatch, the loss, its gradient and one Adam step.
+* **PPO minibatch**: the loss of a shuffled minibatch, its gradient and one Adam step.
 
 Beside it stand **train iteration**, which is collecting a batch (with resets, staggered episodes
 and TorchRL's collector) and the whole update; **evaluation step**, which is policy, env step and
@@ -108,10 +108,10 @@ def advantage(ppo: PPO, batch: TensorDictBase) -> Call:
 
 
 def minibatch(ppo: PPO, batch: TensorDictBase) -> Call:
-    """Draws one minibatch and learns from it."""
+    """Learns from one shuffled minibatch after the other."""
     ppo.estimate_advantage(batch)
     ppo.fill(batch)
-    return lambda: ppo.step(ppo.shuffled.sample(ppo.minibatch_size))
+    return _in_turn(ppo.step, ppo.shuffled.sample().split(ppo.minibatch_size))
 
 
 def start_collecting(collector: Collector, worlds: TensorDict) -> None:
