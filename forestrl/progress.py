@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import sys
 import time
 from pathlib import Path
@@ -32,11 +33,12 @@ class Progress:
             initial=start,
             unit="frame",
             unit_scale=True,
-            smoothing=0,
+            smoothing=0.05,
             disable=not sys.stderr.isatty(),
         )
         self.began = self.last_line = time.monotonic()
-        self.first: tuple[float, int] | None = None  # the first update compiles: not counted
+        self.last_update = self.began
+        self.paces: list[float] = []  # seconds a frame, of each update
         self.shown: dict[str, float] = {}
 
     def __enter__(self) -> Progress:
@@ -56,22 +58,20 @@ class Progress:
         self.shown |= {n: metrics[key] for key, n in _SHOWN.items() if metrics[key] == metrics[key]}
         self.bar.set_postfix({name: f"{value:.3g}" for name, value in self.shown.items()}, False)
         self.bar.update(frames - self.done)
-        self.done = frames
-        if self.first is None:
-            self.first = (now, frames)
-        elif self.bar.disable and (
+        self.paces.append((now - self.last_update) / max(frames - self.done, 1))
+        self.done, self.last_update = frames, now
+        if self.bar.disable and (
             now - self.last_line >= _SECONDS_BETWEEN_LINES or frames >= self.total
         ):
             self.last_line = now
-            print(self._line(now), file=sys.stderr, flush=True)
+            print(self._line(), file=sys.stderr, flush=True)
 
-    def _line(self, now: float) -> str:
-        start, frames = self.first or (self.began, 0)
-        speed = (self.done - frames) / max(now - start, 1e-9)
-        left = (self.total - self.done) / max(speed, 1e-9)
+    def _line(self) -> str:
+        pace = statistics.median(self.paces)  # what is compiled or evaluated once does not count
+        left = (self.total - self.done) * pace
         shown = "  ".join(f"{name} {value:.3g}" for name, value in self.shown.items())
         return (
-            f"{self.done:>9,} of {self.total:,} frames  {speed:,.0f} frames/s  "
+            f"{self.done:>9,} of {self.total:,} frames  {1 / max(pace, 1e-9):,.0f} frames/s  "
             f"{_clock(left)} left  {shown}"
         )
 
