@@ -45,8 +45,8 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
 }
 FUNCTIONAL = [  # each row may import from the rows above it
     {"grid"},
-    {"actions", "arena", "lidar"},
-    {"frontier"},
+    {"actions", "arena"},
+    {"frontier", "lidar"},
     {"graph", "paths", "reward"},
     {"__init__"},
 ]

@@ -66,7 +66,7 @@ def explore_all(makers: Makers, sizes: Sequence[int]) -> dict[int, Forests]:
             size=size,
             n_trees=forest.n_trees,
             num_envs=1,
-            coverage=float(kernels.coverage(worlds["cells"], traversable).mean()),
+            coverage=float(F.coverage(worlds["cells"], traversable).mean()),
             frontiers=float(frontiers.float().mean()),
         )
         room = -(-int(frontiers.max()) // _ROOM) * _ROOM

@@ -37,14 +37,15 @@ def explore(forest: ForestEnv, steps: int) -> TensorDict:
     """
     generator = torch.Generator().manual_seed(_SEED)
     reset = forest.reset()
-    trees, cells, start = reset[K.TREES], reset[K.CELLS], reset[K.POSITION]
+    trees, traversable = reset[K.TREES], reset[K.TRAVERSABLE]
+    cells, start = reset[K.CELLS], reset[K.POSITION]
     phase = torch.randint(1, steps + 1, reset.batch_size, generator=generator).to(cells.device)
     moves = (phase * forest.size**2 / _REFERENCE_AREA).ceil()
     position, action = start, torch.zeros_like(phase)
     for step in range(int(moves.max())):
         action = _next_action(cells, position, action, generator)
         position, _ = F.move(trees, position, action.where(step < moves, F.NULL_ACTION))
-        cells, _ = kernels.reveal(trees, cells, position, forest.sight_lines)
+        cells, _, _ = kernels.sense(trees, traversable, cells, position, forest.sight_lines)
     world = {"trees": trees, "start": start, "cells": cells, "position": position, "phase": phase}
     return TensorDict(world, batch_size=reset.batch_size)
 

@@ -143,8 +143,9 @@ class ForestEnv(EnvBase):
         steps: Tensor,
     ) -> TensorDictBase:
         """Scans from ``position`` and describes the state reached."""
-        cells, new_cells = kernels.reveal(trees, cells, position, self.sight_lines)
-        coverage = kernels.coverage(cells, traversable)
+        cells, new_cells, coverage = kernels.sense(
+            trees, traversable, cells, position, self.sight_lines
+        )
         terminated, truncated = coverage >= self.coverage_goal, steps >= self.max_steps
         return TensorDict(
             {

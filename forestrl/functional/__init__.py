@@ -31,7 +31,7 @@ from forestrl.functional.graph import (
     nearest_waypoint,
 )
 from forestrl.functional.grid import Cell, gather, inside, window_counts, window_counts_at
-from forestrl.functional.lidar import SightLines, reveal, scan, sight_lines
+from forestrl.functional.lidar import SightLines, reveal, scan, sense, sight_lines
 from forestrl.functional.paths import path_lengths
 from forestrl.functional.reward import distance, information_gain, potential, reward
 
@@ -68,6 +68,7 @@ __all__ = [
     "sample_position",
     "sample_trees",
     "scan",
+    "sense",
     "sight_lines",
     "targets",
     "window_counts",

@@ -1,4 +1,4 @@
-"""The LiDAR: 360 degrees, range ``l``, blocked by trunks along discrete lines."""
+"""The LiDAR: 360 degrees, range ``l``, blocked by trunks along discrete lines; what it adds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from forestrl.functional.arena import coverage
 from forestrl.functional.grid import Cell, gather, inside
 
 
@@ -94,3 +95,23 @@ def reveal(
     new = scan(trees, position, lines) & (cells == Cell.UNKNOWN)
     truth = torch.where(trees, int(Cell.OCCUPIED), int(Cell.FREE)).to(cells.dtype)
     return torch.where(new, truth, cells), new.flatten(-2).sum(-1, keepdim=True).float()
+
+
+def sense(
+    trees: Tensor, traversable: Tensor, cells: Tensor, position: Tensor, lines: SightLines
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Scans, adds the scan to the agent's map, and gives the coverage reached.
+
+    Args:
+        trees: occupied cells, bool ``[*B, H, W]``.
+        traversable: the free cells that can be reached from the start, bool ``[*B, H, W]``.
+        cells: the agent's map, uint8 ``[*B, H, W]``; it is not changed.
+        position: int64 ``[*B, 2]``.
+        lines: from :func:`sight_lines`.
+
+    Returns:
+        the new map and ``n^e``, as from :func:`reveal`, and ``rho``, as from
+        :func:`~forestrl.functional.coverage`.
+    """
+    cells, new_cells = reveal(trees, cells, position, lines)
+    return cells, new_cells, coverage(cells, traversable)

@@ -32,18 +32,16 @@ def _compiled(compiled: Callable[..., R], reference: Callable[..., R]) -> Callab
 
 exploration_graph = _compiled(graph.exploration_graph, F.exploration_graph)
 potential = _compiled(graph.potential, F.potential)
-reveal = _compiled(sensing.reveal, F.reveal)
-coverage = _compiled(sensing.coverage, F.coverage)
+sense = _compiled(sensing.sense, F.sense)
 component = _compiled(paths.component, F.component)
 largest_component = _compiled(paths.largest_component, F.largest_component)
 path_lengths = _compiled(paths.path_lengths, F.path_lengths)
 
 __all__ = [
     "component",
-    "coverage",
     "exploration_graph",
     "largest_component",
     "path_lengths",
     "potential",
-    "reveal",
+    "sense",
 ]

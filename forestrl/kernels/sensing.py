@@ -1,4 +1,4 @@
-"""The LiDAR and the coverage, compiled: a step looks at the cells in range and counts the map."""
+"""The LiDAR and the coverage, compiled: all of a map's work while it is in the cache."""
 
 from __future__ import annotations
 
@@ -12,66 +12,69 @@ from forestrl.functional import Cell, SightLines
 _UNKNOWN, _FREE, _OCCUPIED = int(Cell.UNKNOWN), int(Cell.FREE), int(Cell.OCCUPIED)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def _reveal(
-    trees: np.ndarray,
-    cells: np.ndarray,
-    position: np.ndarray,
-    offsets: np.ndarray,
+    trees: np.ndarray, cells: np.ndarray, width: int, row: int, col: int, offsets: np.ndarray,
     between: np.ndarray,
-    new_cells: np.ndarray,
-) -> None:
-    height, width = trees.shape[1:]
+) -> int:  # fmt: skip
+    """Adds a scan to one map in place; returns how many cells became known."""
+    height, new = len(cells) // width, 0
+    for k in range(len(offsets)):
+        r, c = row + offsets[k, 0], col + offsets[k, 1]
+        if r < 0 or r >= height or c < 0 or c >= width or cells[r * width + c] != _UNKNOWN:
+            continue
+        hidden = False
+        for i in range(between.shape[1]):
+            hidden |= trees[(row + between[k, i, 0]) * width + col + between[k, i, 1]]
+        if not hidden:
+            cells[r * width + c] = _OCCUPIED if trees[r * width + c] else _FREE
+            new += 1
+    return new
+
+
+@njit(cache=True)
+def _covered(cells: np.ndarray, traversable: np.ndarray) -> np.float32:
+    """Gives the explored share of the traversable cells; 32-bit counters, so that it vectorises."""
+    known, total = np.int32(0), np.int32(0)
+    for i in range(len(cells)):
+        known = np.int32(known + np.int32(traversable[i] & (cells[i] == _FREE)))
+        total = np.int32(total + np.int32(traversable[i]))
+    return np.float32(known) / np.float32(total)
+
+
+@njit(cache=True, parallel=True)
+def _sense(
+    trees: np.ndarray, traversable: np.ndarray, before: np.ndarray, width: int,
+    position: np.ndarray, offsets: np.ndarray, between: np.ndarray, after: np.ndarray,
+    new_cells: np.ndarray, covered: np.ndarray,
+) -> None:  # fmt: skip
+    """Works on maps row by row, ``[B, H * W]``; writes the last three arrays."""
     for b in prange(len(trees)):
+        for i in range(trees.shape[1]):  # as a loop it becomes one copy of memory
+            after[b, i] = before[b, i]
         row, col = position[b]
-        new = 0
-        for k in range(len(offsets)):
-            r, c = row + offsets[k, 0], col + offsets[k, 1]
-            if r < 0 or r >= height or c < 0 or c >= width or cells[b, r, c] != _UNKNOWN:
-                continue
-            hidden = False
-            for i in range(between.shape[1]):
-                hidden |= trees[b, row + between[k, i, 0], col + between[k, i, 1]]
-            if not hidden:
-                cells[b, r, c] = _OCCUPIED if trees[b, r, c] else _FREE
-                new += 1
-        new_cells[b] = new
+        new_cells[b] = _reveal(trees[b], after[b], width, row, col, offsets, between)
+        covered[b] = _covered(after[b], traversable[b])
 
 
-def reveal(
-    trees: Tensor, cells: Tensor, position: Tensor, lines: SightLines
-) -> tuple[Tensor, Tensor]:
-    """:func:`forestrl.functional.reveal`, compiled."""
-    cells = cells.clone(memory_format=torch.contiguous_format)
+def sense(
+    trees: Tensor, traversable: Tensor, cells: Tensor, position: Tensor, lines: SightLines
+) -> tuple[Tensor, Tensor, Tensor]:
+    """:func:`forestrl.functional.sense`, compiled."""
+    height, width = trees.shape[-2:]
+    after = torch.from_numpy(np.empty(cells.shape, np.uint8))  # numpy asks for huge pages
     new_cells = torch.empty(*cells.shape[:-2], 1)
-    _reveal(
-        trees.reshape(-1, *trees.shape[-2:]).contiguous().numpy(),
-        cells.view(-1, *cells.shape[-2:]).numpy(),
+    covered = torch.empty_like(new_cells)
+    _sense(
+        trees.reshape(-1, height * width).contiguous().numpy(),
+        traversable.reshape(-1, height * width).contiguous().numpy(),
+        cells.reshape(-1, height * width).contiguous().numpy(),
+        width,
         position.reshape(-1, 2).contiguous().numpy(),
         lines.offsets.numpy(),
         lines.between.numpy(),
+        after.view(-1, height * width).numpy(),
         new_cells.view(-1).numpy(),
+        covered.view(-1).numpy(),
     )
-    return cells, new_cells
-
-
-@njit(cache=True, parallel=True)
-def _coverage(cells: np.ndarray, traversable: np.ndarray, out: np.ndarray) -> None:
-    for b in prange(len(cells)):
-        known = total = 0
-        for i in range(cells.shape[1]):
-            known += traversable[b, i] & (cells[b, i] == _FREE)
-            total += traversable[b, i]
-        out[b] = np.float32(known) / np.float32(total)
-
-
-def coverage(cells: Tensor, traversable: Tensor) -> Tensor:
-    """:func:`forestrl.functional.coverage`, compiled."""
-    out = torch.empty(*cells.shape[:-2], 1)
-    area = cells.shape[-2] * cells.shape[-1]
-    _coverage(
-        cells.reshape(-1, area).contiguous().numpy(),
-        traversable.reshape(-1, area).contiguous().numpy(),
-        out.view(-1).numpy(),
-    )
-    return out
+    return after, new_cells, covered

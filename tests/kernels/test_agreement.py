@@ -28,8 +28,7 @@ TESTED = {
     "path_lengths",
     "component",
     "largest_component",
-    "reveal",
-    "coverage",
+    "sense",
 }
 
 
@@ -116,25 +115,19 @@ def test_the_compiled_paths_equal_the_reference_from_any_cell(free, data):
 def test_the_compiled_scan_equals_the_reference(batch, lidar_range):
     lines = F.sight_lines(lidar_range)
     trees, cells, position = explored_states(20, batch)
-    nothing = torch.zeros_like(cells)
-    for before in (cells, nothing):
-        ours = sensing.reveal(trees, before, position, lines)
-        assert_same(ours, F.reveal(trees, before, position, lines))
+    traversable = F.component(~trees, position)
+    for before in (cells, torch.zeros_like(cells)):
+        ours = sensing.sense(trees, traversable, before, position, lines)
+        assert_same(ours, F.sense(trees, traversable, before, position, lines))
 
 
 @given(worlds())
 def test_the_compiled_scan_equals_the_reference_on_any_world(state):
     trees, position = state
     lines, nothing = F.sight_lines(4.0), torch.zeros_like(trees, dtype=torch.uint8)
-    ours = sensing.reveal(trees, nothing, position, lines)
-    assert_same(ours, F.reveal(trees, nothing, position, lines))
-
-
-@pytest.mark.parametrize("batch", BATCHES)
-def test_the_compiled_coverage_equals_the_reference(batch):
-    trees, cells, position = explored_states(21, batch)
     traversable = F.component(~trees, position)
-    assert_same(sensing.coverage(cells, traversable), F.coverage(cells, traversable))
+    ours = sensing.sense(trees, traversable, nothing, position, lines)
+    assert_same(ours, F.sense(trees, traversable, nothing, position, lines))
 
 
 @pytest.mark.parametrize("batch", BATCHES)
@@ -153,9 +146,8 @@ def test_compiled_functions_of_a_stack_are_the_stack_of_functions(batch):
     for function in (paths.path_lengths, paths.component):
         assert_batched_equals_singles(function, free, position, batch=batch)
     assert_batched_equals_singles(paths.largest_component, free, batch=batch)
-    assert_batched_equals_singles(sensing.coverage, cells, free, batch=batch)
     assert_batched_equals_singles(
-        lambda t, c, p: sensing.reveal(t, c, p, lines), trees, cells, position, batch=batch
+        lambda t, c, p: sensing.sense(t, ~t, c, p, lines), trees, cells, position, batch=batch
     )
 
 
@@ -167,6 +159,6 @@ def test_compiled_functions_leave_their_inputs_as_they_were():
     kernels.potential(cells, position, window=7, beta=0.5)
     kernels.path_lengths(free, position)
     kernels.largest_component(columns_first(free))
-    kernels.reveal(trees, cells, position, F.sight_lines(5.0))
+    kernels.sense(trees, ~trees, cells, position, F.sight_lines(5.0))
     for now, then in zip((trees, cells, position, free), before, strict=True):
         assert torch.equal(now, then)
