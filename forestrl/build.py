@@ -21,7 +21,7 @@ from forestrl.loggers import CsvLogger, Logger, Loggers, NoLogger, TensorboardLo
 from forestrl.policies.learned import ActorCritic
 from forestrl.policies.released import RELEASED, Policy, find_policy, load_policy, require_same
 
-_ARCHITECTURE = ("hidden", "heads", "critic_readout", "lidar_range")
+_ARCHITECTURE = ("hidden", "heads", "critic_readout", "lidar_range", "edge_lengths")
 
 
 class ConfigError(ValueError):

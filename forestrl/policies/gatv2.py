@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal, get_args
 
 import torch
@@ -37,10 +38,16 @@ class GATv2Encoder(nn.Module):
             gradient for ``x``; ``"pyg"``, and ``"fused"`` on other devices, with PyTorch Geometric.
             Both have the same parameters and results.
         lidar_range: ``l``, cells, the unit of edge lengths.
+        edge_lengths: whether the attention reads them; without, every edge counts as of length 0.
     """
 
     def __init__(
-        self, hidden: int = 16, heads: int = 4, kernel: Kernel = "fused", lidar_range: float = 5.0
+        self,
+        hidden: int = 16,
+        heads: int = 4,
+        kernel: Kernel = "fused",
+        lidar_range: float = 5.0,
+        edge_lengths: bool = True,
     ) -> None:
         super().__init__()
         if kernel not in get_args(Kernel):
@@ -51,7 +58,8 @@ class GATv2Encoder(nn.Module):
                 msg = f"{name} must be at least 1, not {value}"
                 raise ValueError(msg)
         self.kernel = kernel
-        self.lidar_range = lidar_range
+        self.lidar_range = lidar_range if edge_lengths else math.inf
+        self.edge_lengths = edge_lengths
         self.conv1 = GATv2Conv(F.FEATURES, hidden, heads=heads, edge_dim=1, add_self_loops=False)
         self.conv2 = GATv2Conv(heads * hidden, 1, edge_dim=1, add_self_loops=False)
 
@@ -67,6 +75,8 @@ class GATv2Encoder(nn.Module):
         Returns:
             ``[*B, 9]``.
         """
+        if not self.edge_lengths:
+            length = torch.zeros_like(length)
         if self.kernel == "fused" and x.device.type == "cpu":
             return gatv2_encoder(
                 x, waypoint, length, frontiers, self.conv1, self.conv2, lidar_range=self.lidar_range

@@ -45,6 +45,7 @@ class ActorCritic(nn.Module):
         critic_readout: how the critic aggregates the nine outputs.
         kernel: ``fused``, compiled for the CPU, or ``pyg``, PyTorch Geometric's layers.
         lidar_range: ``l``, cells, the unit of edge lengths.
+        edge_lengths: whether the attention reads them.
     """
 
     def __init__(
@@ -54,11 +55,12 @@ class ActorCritic(nn.Module):
         critic_readout: Readout = "mean",
         kernel: Kernel = "fused",
         lidar_range: float = 5.0,
+        edge_lengths: bool = True,
     ) -> None:
         super().__init__()
 
         def encoder() -> GATv2Encoder:
-            return GATv2Encoder(hidden, heads, kernel=kernel, lidar_range=lidar_range)
+            return GATv2Encoder(hidden, heads, kernel, lidar_range, edge_lengths)
 
         self.actor = encoder()
         self.critic = Critic(encoder(), readout=critic_readout)

@@ -25,6 +25,7 @@ RELEASED = ASSETS / "paper.safetensors"
 """The released policy, used where no checkpoint is given."""
 
 POLICY_FILE = "policy.safetensors"
+_WHERE_SILENT = {"edge_lengths": True}  # what older files do not say
 _IN_A_RUN = ("checkpoints/best", "checkpoints/latest", "")
 
 
@@ -137,7 +138,7 @@ def require_same(policy: Policy, wanted: Mapping[str, Any], source: str) -> None
     Raises:
         CheckpointError: naming the first field that differs and both values.
     """
-    made_for = {**policy.model, "window": policy.window}
+    made_for = {**_WHERE_SILENT, **policy.model, "window": policy.window}
     for name, value in wanted.items():
         if name in made_for and made_for[name] != value:
             raise CheckpointError(

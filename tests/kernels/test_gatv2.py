@@ -92,6 +92,19 @@ def test_other_lidar_range():
     assert_equal_networks(*encoders(lidar_range=8.0), graphs((3,)))
 
 
+def test_without_edge_lengths_the_attention_reads_none():
+    graph = graphs((3,))
+    assert_equal_networks(*encoders(edge_lengths=False), graph)
+    for blind, seeing in zip(encoders(edge_lengths=False), encoders(), strict=True):
+        farther = graph._replace(length=3 * graph.length)
+        assert torch.equal(blind(*farther), blind(*graph))
+        assert not torch.equal(seeing(*farther), seeing(*graph))
+        with torch.no_grad():  # lengths enter by these weights alone
+            for conv in (seeing.conv1, seeing.conv2):
+                conv.lin_edge.weight.zero_()
+        torch.testing.assert_close(blind(*graph), seeing(*graph))
+
+
 def test_graphs_without_room_for_frontiers():
     assert_equal_networks(*encoders(), graphs((3,), 0, 0, room=0))
 

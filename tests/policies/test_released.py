@@ -132,6 +132,7 @@ def test_weights_of_another_shape_are_refused(tmp_path):
         ("heads", 4, 1),
         ("critic_readout", "mean", "concat"),
         ("lidar_range", 5.0, 7.0),
+        ("edge_lengths", True, False),
         ("window", 7, 9),
     ],
 )
