@@ -13,7 +13,7 @@ from forestrl.publishing.files import ResultError
 from forestrl.publishing.panel import Panel
 from forestrl.publishing.panels import panels
 from forestrl.publishing.readme import replace_between_marks, tables, text
-from forestrl.publishing.results import FIGURES, Results, read_results
+from forestrl.publishing.results import ABLATIONS, FIGURES, Results, read_results
 from forestrl.publishing.sweeps import Job, aggregate
 from forestrl.storage import atomic_write
 
@@ -41,27 +41,36 @@ def publish(cfg: DictConfig) -> None:
                 print(atomic_write(folder / FIGURES / f"{name}.{kind}", data))
         else:
             print(f"{name} skipped: it wants, in {folder}, {panel}")
-    for name, table in tables(results, cfg.policy).items():
+    jobs = _jobs(folder / ABLATIONS)
+    ablations = aggregate(jobs).markdown if jobs else ""
+    for name, table in tables(results, cfg.policy, ablations).items():
         if table:
             print(atomic_write(folder / name, table))
     if cfg.readme is not None:
         readme = Path(str(cfg.readme))
-        new = text(results, cfg.policy, drawn, readme=readme, training=_commands(results))
+        commands = _commands(results)
+        new = text(results, cfg.policy, ablations, drawn, readme=readme, training=commands)
         print(atomic_write(readme, replace_between_marks(_read(readme), new)))
 
 
 def sum_up(folder: Path) -> None:
     """Prints a sweep's table and writes it into the sweep's folder."""
-    found = [path.parents[1] for path in folder.glob("*/.hydra/overrides.yaml")]
-    jobs = sorted(found, key=lambda job: (len(job.name), job.name))  # 2 before 10
+    jobs = _jobs(folder)
     if not jobs:
         raise ResultError(f"sweep={folder} holds no job: it wants <job>/.hydra/overrides.yaml")
-    sweep = aggregate([Job(job, _overrides(job / ".hydra" / "overrides.yaml")) for job in jobs])
+    sweep = aggregate(jobs)
     print(sweep.markdown)
     for line in sweep.skipped:
         print(f"skipped: {line}")
     print(atomic_write(folder / "table.md", sweep.markdown))
     print(atomic_write(folder / "table.csv", sweep.csv))
+
+
+def _jobs(folder: Path) -> list[Job]:
+    """The jobs of a sweep's folder, in their order: 2 before 10."""
+    found = folder.glob("*/.hydra/overrides.yaml")
+    paths = sorted(found, key=lambda path: (len(path.parents[1].name), path.parents[1].name))
+    return [Job(path.parents[1], _overrides(path)) for path in paths]
 
 
 def _commands(results: Results) -> dict[Path, str]:

@@ -34,7 +34,7 @@ def differences(results: Results, reference: str) -> str:
     ours, rows = methods[reference].first, []
     for name in ordered(methods.keys() - {reference}):
         theirs = methods[name].first
-        if world(ours) == world(theirs):
+        if _world(ours) == _world(theirs):
             cells = [_difference(column, ours, theirs) for column in _PAIRED]
             common = ours.by_arena("index").keys() & theirs.by_arena("index").keys()
             rows.append([LABELS.get(name, f"`{name}`"), str(len(common)), *cells])
@@ -42,7 +42,25 @@ def differences(results: Results, reference: str) -> str:
     return markdown(head, rows) if rows else ""
 
 
-def world(evaluation: Evaluation) -> tuple[object, ...]:
+def paired(column: str, ours: Evaluation, theirs: Evaluation) -> Difference | None:
+    """Compares two evaluations arena by arena: ours minus theirs.
+
+    Args:
+        column: of episodes.csv.
+        ours: the first evaluation.
+        theirs: the second.
+
+    Returns:
+        None if they are not of the same arenas, or one of them lacks the column.
+    """
+    if _world(ours) != _world(theirs):
+        return None
+    if any(column not in each.episodes for each in (ours, theirs)):
+        return None
+    return paired_difference(ours.by_arena(column), theirs.by_arena(column))
+
+
+def _world(evaluation: Evaluation) -> tuple[object, ...]:
     """Gives what fixes the arenas, and the length of the episodes in them."""
     meta = evaluation.summary["meta"]
     env = {key: meta.get("env", {}).get(key) for key in ("size", "n_trees", "tree_radius")}
@@ -52,9 +70,7 @@ def world(evaluation: Evaluation) -> tuple[object, ...]:
 
 def _difference(column: Column, ours: Evaluation, theirs: Evaluation) -> str:
     """A cell: the mean difference, bold where ours is ahead, in italics where theirs is."""
-    if any(column.measure not in each.episodes for each in (ours, theirs)):
-        return "–"
-    difference = paired_difference(ours.by_arena(column.measure), theirs.by_arena(column.measure))
+    difference = paired(column.measure, ours, theirs)
     if difference is None:
         return "–"
     text = column.cell(difference.interval)

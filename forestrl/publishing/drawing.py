@@ -54,6 +54,7 @@ LINES = {
     "mmpf_published": Line("#4D9F7A", (0, (4, 1.5)), "^"),
     "mmpf_mended": Line("#4D9F7A", "-", "^"),
     "nearest_frontier": Line("#555555", (0, (6, 1.5, 1, 1.5))),
+    "information_gain": Line("#7A3E9D", (0, (2, 1)), "o"),
     "random": Line("#909090", (0, (1, 1.2))),
 }
 """Lines of Fig. 3b, in the order of its legend."""

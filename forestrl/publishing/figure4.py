@@ -22,7 +22,7 @@ from forestrl.publishing.panel import (
 from forestrl.publishing.results import SETTINGS, Method, Results
 from forestrl.publishing.tables import forest
 
-_SIZES, _DENSITIES = ("nominal", "size75", "size100"), ("nominal", "trees60", "trees75")
+_SIZES, _DENSITIES = ("size50", "size75", "size100"), ("nominal", "trees60", "trees75")
 _MARKERS, _LONG = "o^s", 10_000
 
 

@@ -8,67 +8,90 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from forestrl.publishing.comparisons import differences, forests
+from forestrl.publishing.endings import endings
 from forestrl.publishing.files import ResultError
 from forestrl.publishing.panel import Panel
 from forestrl.publishing.reproduction import reproduction
 from forestrl.publishing.results import FIGURES, Evaluation, Results, Training
+from forestrl.publishing.summary import summary
 from forestrl.publishing.tables import headline
 
 _START, _END = "<!-- results -->", "<!-- /results -->"
-_REPRODUCTION = """### Does it reproduce?
-
-"""
-_HEADLINE = """### What beats what
+_WORDS = {
+    "summary": "### In a minute\n",
+    "reproduction": "### Does it reproduce?\n",
+    "headline": """### What beats what
 
 Nominal forest (h = 50, 45 trunks). Coverage, area under the coverage curve and interventions in
 per cent. Steps to 98 %: mean of the runs that got there, whose share stands beside. ± is the larger
 side of the 95 % bootstrap interval of the mean, over what its column says: arenas are resampled for
 one checkpoint or planner, training seeds for the method. **Bold**: best of a column; for steps only
 where 95 % of the runs got there. Planners that never need an intervention do not count in those
-columns, nor does hindsight in any.
+columns, nor does hindsight in any. *Italics*: numbers from elsewhere. The paper's are those of its
+text. Explore-Bench's grid simulator (commit ce3b98a, unchanged) was run in 40 forests of this size
+with a wall around, whose trunks have integer centres and radii. The plain program was written
+without this code and run in 300 other forests; its frontiers and its rule for ties are its own.
+""",
+    "endings": """### How the runs end
 
-"""
-_DIFFERENCES = """### By how much
+Share of the runs in the nominal forest, in per cent: 98 % of the cells reached, or why not. The
+planners as published keep the faults of Explore-Bench's code and go round in cycles or aim at
+trunks; mended, with path lengths over diagonal moves too and frontiers out of reach left aside,
+none does. The last column is the mean coverage at the end of the runs that did not reach 98 %.
+""",
+    "differences": """### By how much
 
 Paired differences on the same arenas of the nominal forest, for one checkpoint: ± is the larger
 side of the 95 % bootstrap interval over arenas. Coverage, area and interventions in percentage
 points; steps over the arenas where both got to 98 %, whose number stands beside. **Bold**: the
 interval excludes 0 in favour of the first; *italics*: in favour of the other.
-
-"""
-_FORESTS = """### Denser and larger forests
+""",
+    "forests": """### Denser and larger forests
 
 Coverage and interventions in per cent; ± as above.
+""",
+    "ablations": """### What each part is good for
 
-"""
+Short trainings with a part left out or another beta, each measured at its end on 100 arenas, made
+by `forestrl train experiment=ablations hydra.sweep.dir=multirun/results/ablations`.
+""",
+}
+"""What stands above each table, in the order of the README."""
+_APART = "differences"
+"""Has a file of its own."""
 
 
-def tables(results: Results, policy: str) -> dict[str, str]:
+def tables(results: Results, policy: str, ablations: str) -> dict[str, str]:
     """Writes ``table.md`` and ``differences.md``; a part without any data is left out.
 
     Args:
         results: what was read.
         policy: name of the learned policy.
+        ablations: the table of the ablations.
     """
-    *others, last = _parts(results, policy)
-    return {"table.md": "\n".join(filter(None, others)), "differences.md": last}
+    found = _tables(results, policy, ablations)
+    pairs = found.pop(_APART, "")
+    return {"table.md": "\n".join(found.values()), "differences.md": pairs}
 
 
-def _parts(results: Results, policy: str) -> tuple[str, str, str, str]:
-    """All tables under their headings, the differences last; empty where there is nothing."""
-    parts = (
-        (_REPRODUCTION, reproduction(results, policy)),
-        (_HEADLINE, headline(results)),
-        (_FORESTS, forests(results)),
-        (_DIFFERENCES, differences(results, policy)),
-    )
-    first, second, third, fourth = (words + table if table else "" for words, table in parts)
-    return first, second, third, fourth
+def _tables(results: Results, policy: str, ablations: str) -> dict[str, str]:
+    """Every table that there is data for, under its heading."""
+    made = {
+        "summary": summary(results, policy),
+        "reproduction": reproduction(results, policy),
+        "headline": headline(results),
+        "endings": endings(results),
+        "differences": differences(results, policy),
+        "forests": forests(results),
+        "ablations": ablations,
+    }
+    return {name: f"{_WORDS[name]}\n{table}" for name, table in made.items() if table}
 
 
 def text(
     results: Results,
     policy: str,
+    ablations: str,
     panels: Mapping[str, Panel | str],
     *,
     readme: Path,
@@ -79,12 +102,12 @@ def text(
     Args:
         results: what was read.
         policy: name of the learned policy.
+        ablations: the table of the ablations.
         panels: every figure.
         readme: the file, to which the links are relative.
         training: commands of the trainings, by the file of their metrics.
     """
-    reproduced, best, others, pairs = _parts(results, policy)
-    parts = [part for part in (reproduced, best, pairs, others) if part]
+    parts = list(_tables(results, policy, ablations).values())
     drawn = {name: panel for name, panel in panels.items() if isinstance(panel, Panel)}
     if drawn:
         parts.append("### Figures\n")

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 from forestrl import paper as P
-from forestrl.publishing.results import Results
+from forestrl.publishing.results import Method, Results
 from forestrl.publishing.statistics import Interval
 from forestrl.publishing.tables import LABELS, Column, forest, markdown
 
@@ -14,7 +14,7 @@ Kind = Literal["≥", "≤", ""]
 """Whether more is better, less is, or neither."""
 
 
-class _Claim(NamedTuple):
+class Claim(NamedTuple):
     """A number of the paper, and where ours is found."""
 
     label: str
@@ -36,36 +36,42 @@ def reproduction(results: Results, policy: str) -> str:
         a Markdown table, empty if nothing was measured.
     """
     rows = []
-    for claim in _claims(policy):
-        method = results.method(claim.setting, claim.policy)
-        value = method.measure(claim.measure) if method else None
-        if method and value:
-            paper = f"{claim.kind} {100 * claim.share:.0f}".strip()
-            here = Column("", claim.measure).cell(value)
-            reached = verdict(value, claim.share, claim.kind)
-            rows.append([claim.label, paper, here, method.unit, reached])
+    for claim, method, missed in measured(results, policy):
+        paper = f"{claim.kind} {100 * claim.share:.0f}".strip()
+        here = Column("", claim.measure).cell(method.measure(claim.measure))
+        rows.append([claim.label, paper, here, method.unit, missed or "yes"])
     head = ["statement of the paper (%)", "paper", "here", "± over", "reached"]
     return markdown(head, rows) if rows else ""
 
 
-def _claims(policy: str) -> Iterable[_Claim]:
+def measured(results: Results, policy: str) -> Iterable[tuple[Claim, Method, str]]:
+    """Gives the statements that were measured, by whom, and why one is not reached, if so."""
+    for claim in _claims(policy):
+        method = results.method(claim.setting, claim.policy)
+        value = method.measure(claim.measure) if method else None
+        if method and value:
+            reached = verdict(value, claim.share, claim.kind)
+            yield claim, method, "" if reached == "yes" else reached
+
+
+def _claims(policy: str) -> Iterable[Claim]:
     """All statements of Sec. III with a number."""
     learned, rate = LABELS.get(policy, f"`{policy}`"), "intervention_rate"
     for step, share in P.COVERAGE.items():
         label, measure = f"{learned}: coverage at {step} steps", f"coverage_{step}"
-        yield _Claim(label, "nominal", policy, measure, share, "≥")
-    yield _Claim("interventions, mean", "nominal", policy, rate, P.INTERVENTION_RATE, "≤")
+        yield Claim(label, "nominal", policy, measure, share, "≥")
+    yield Claim("interventions, mean", "nominal", policy, rate, P.INTERVENTION_RATE, "≤")
     label, measure = "runs with under 15 % interventions", "share_under_15"
-    yield _Claim(label, "nominal", policy, measure, P.SHARE_UNDER_LIMIT, "≥")
+    yield Claim(label, "nominal", policy, measure, P.SHARE_UNDER_LIMIT, "≥")
     for setting, step in P.PASSED_AT.items():
         label, measure = f"{forest(setting)}: coverage at {step} steps", f"coverage_{step}"
-        yield _Claim(label, setting, policy, measure, P.MORE_THAN, "≥")
+        yield Claim(label, setting, policy, measure, P.MORE_THAN, "≥")
     label = "75 trunks: interventions, mean"
-    yield _Claim(label, "trees75", policy, rate, P.DENSE_INTERVENTION_RATE, "≤")
+    yield Claim(label, "trees75", policy, rate, P.DENSE_INTERVENTION_RATE, "≤")
     for name, share in P.BENCHMARKS.items():
         planner = f"{name}_published"
         label, measure = f"{LABELS[planner]}: coverage at 2500 steps", "coverage_2500"
-        yield _Claim(label, "nominal", planner, measure, share, "")
+        yield Claim(label, "nominal", planner, measure, share, "")
 
 
 def verdict(value: Interval, share: float, kind: Kind) -> str:

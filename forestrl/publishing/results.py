@@ -18,11 +18,12 @@ SETTINGS = {
     "nominal": (50, 45),
     "trees60": (50, 60),
     "trees75": (50, 75),
+    "size50": (50, 45),
     "size75": (75, 101),
     "size100": (100, 180),
 }
-"""Arena side and number of trunks of each setting (Fig. 3 and 4)."""
-TRAINING, FIGURES = "training", "figures"
+"""Arena side and number of trunks of each setting (Fig. 3 and 4); size* run 10,000 steps."""
+TRAINING, FIGURES, ABLATIONS = "training", "figures", "ablations"
 """Folders beside the settings."""
 
 _EPISODES = ("index", "coverage", "intervention_rate", "steps_to_98")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from forestrl import paper as P
+from forestrl.publishing.elsewhere import BESIDE
 from forestrl.publishing.results import SETTINGS, Method, Results
 from forestrl.publishing.statistics import Interval
 
@@ -24,15 +24,6 @@ LABELS = {
 }
 """Known policies, in the order of the tables."""
 
-_PAPER = {  # its row stands after this policy's
-    "learned_mode": (
-        "GATv2 and PPO",
-        {f"coverage_{step}": share for step, share in P.COVERAGE.items()}
-        | {"intervention_rate": P.INTERVENTION_RATE, "percentile_80": P.INTERVENTION_LIMIT},
-    ),
-    "cost_mended": ("cost-based", {"coverage_2500": P.BENCHMARKS["cost"]}),
-    "mmpf_mended": ("MMPF", {"coverage_2500": P.BENCHMARKS["mmpf"]}),
-}
 _PRIVILEGED = "hindsight"
 _MOST = 0.95  # of the runs must get there before their steps to 98 % count as best
 
@@ -104,7 +95,7 @@ def headline(results: Results) -> str:
 
 
 def _headline_rows(methods: dict[str, Method]) -> Iterable[Row]:
-    """Our rows, and the paper's after them; a method of several seeds has its checkpoint too."""
+    """Our rows, and other sources' after them; a method of several seeds has its checkpoint too."""
     for name in ordered(LABELS.keys() | methods.keys()):
         label = LABELS.get(name, f"`{name}`")
         if name in methods:
@@ -114,10 +105,8 @@ def _headline_rows(methods: dict[str, Method]) -> Iterable[Row]:
                 seed = min(method.seeds)
                 checkpoint = Method(name, {seed: method.first})
                 yield _row(f"{label}: seed {seed}", checkpoint, competes)
-        if name in _PAPER:
-            label, values = _PAPER[name]
-            numbers = {measure: Interval(value) for measure, value in values.items()}
-            yield Row(f"*paper: {label}*", "", numbers)
+        for other in BESIDE.get(name, ()):
+            yield Row(f"*{other.label}*", other.unit, other.values, competes=False)
 
 
 def _row(label: str, method: Method, competes: bool) -> Row:

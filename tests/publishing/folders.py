@@ -13,17 +13,20 @@ def mean(value, margin=0.01):
     return {"mean": value, "low": value - margin, "high": value + margin}
 
 
-def write_evaluation(root: Path, setting="nominal", name="learned", coverage=(0.9, 0.8), rate=0.1):
-    """An arena for each coverage, which holds from the first step on."""
+def write_evaluation(
+    root: Path, setting="nominal", name="learned", coverage=(0.9, 0.8), rate=0.1, endings=None
+):
+    """An arena for each coverage, which holds from the first step on; under 10 % it is stuck."""
     folder = root / setting / name
     folder.mkdir(parents=True)
     size, trees = SIDES[setting]
     average = sum(coverage) / len(coverage)
+    reached = sum(share >= 0.1 for share in coverage) / len(coverage)
     summary = {
         "arenas": len(coverage),
         "steps": STEPS,
         "coverage": {str(step): mean(average) for step in (250, 500, 1000, 2000, STEPS)},
-        "steps_to": {"98": mean(400, 10) | {"reached": 1.0}},
+        "steps_to": {"98": mean(400, 10) | {"reached": reached}},
         "area_under_curve": {"500": mean(average), "2500": mean(average)},
         "interventions": {
             "rate": mean(rate, 0.01 if rate else 0.0),
@@ -31,6 +34,7 @@ def write_evaluation(root: Path, setting="nominal", name="learned", coverage=(0.
             "share_under_15": 1.0,
         },
         "collisions": 0,
+        "endings": {"covered": 1.0} if endings is None else endings,
         "meta": {
             "command": f"forestrl eval policy={name}",
             "env": {"size": size, "n_trees": trees, "tree_radius": [1.0, 3.0]},
@@ -38,7 +42,8 @@ def write_evaluation(root: Path, setting="nominal", name="learned", coverage=(0.
         },
     }
     (folder / "summary.json").write_text(json.dumps(summary))
-    rows = [f"{i},{share},{share},{rate},{400 + i}" for i, share in enumerate(coverage)]
+    steps = ["" if share < 0.1 else str(400 + i) for i, share in enumerate(coverage)]
+    rows = [f"{i},{share},{share},{rate},{steps[i]}" for i, share in enumerate(coverage)]
     head = "index,coverage,coverage_500,intervention_rate,steps_to_98"
     (folder / "episodes.csv").write_text("\n".join([head, *rows]) + "\n")
     curve = [f"{step},{average},{average - 0.01},{average + 0.01}" for step in (0, 500, STEPS)]

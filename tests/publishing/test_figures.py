@@ -56,13 +56,35 @@ def test_readme_gets_the_results_and_keeps_the_rest(results, tmp_path):
     for _ in range(2):  # the second time changes nothing
         assert figures(results, f"readme={readme}").status == 0
         text = readme.read_bytes().decode()
-        assert text.startswith("# Title  \r\n\ntext <!-- results -->\n\n### Does it reproduce?")
+        assert text.startswith("# Title  \r\n\ntext <!-- results -->\n\n### In a minute")
         assert text.endswith("\n\n<!-- /results -->\nmore, no line end") and "stale" not in text
     for table in ("table.md", "differences.md"):
         assert (results / table).read_text().splitlines()[-1] in text
     assert '<img src="results/figures/fig4a.png"' in text
     assert f"forestrl eval policy=learned hydra.run.dir={results}/size75/learned\n" in text
     assert "forestrl train experiment=paper seed=0\n" in text
+
+
+def write_sweep(folder, jobs):
+    for name, overrides in jobs.items():
+        hydra = folder / name / ".hydra"
+        hydra.mkdir(parents=True)
+        (hydra / "overrides.yaml").write_text("".join(f"- {override}\n" for override in overrides))
+        write_training(folder / name / "metrics.csv", evaluated=(0.5,))
+
+
+def test_committed_ablations_are_in_the_readme(results, tmp_path):
+    jobs = {"0": ["ablation=none", "seed=0"], "1": ["ablation=no_filter", "seed=0"]}
+    write_sweep(results / "ablations", jobs)
+    readme = tmp_path / "README.md"
+    readme.write_bytes(README.encode())
+    assert figures(results, f"readme={readme}").status == 0
+    text = readme.read_text()
+    for line in (
+        "### What each part is good for",
+        "| `ablation=no_filter` | 1 seed | 3000 | 50.0 |",
+    ):
+        assert line in text and line in (results / "table.md").read_text()
 
 
 def test_a_figure_without_data_is_skipped_with_what_it_wants(tmp_path):
@@ -126,11 +148,7 @@ def test_marks_must_be_there_once_in_order(text):
 
 
 def test_a_sweep_is_summed_up_in_its_folder(tmp_path):
-    for job in ("2", "10"):
-        hydra = tmp_path / job / ".hydra"
-        hydra.mkdir(parents=True)
-        (hydra / "overrides.yaml").write_text(f"- reward.beta={job}\n- seed=0\n")
-        write_training(tmp_path / job / "metrics.csv", evaluated=(0.5,))
+    write_sweep(tmp_path, {job: [f"reward.beta={job}", "seed=0"] for job in ("2", "10")})
     result = forestrl("figures", f"sweep={tmp_path}")
     assert result.status == 0
     table = (tmp_path / "table.md").read_text()

@@ -5,9 +5,11 @@ import math
 import pytest
 
 from forestrl.publishing.comparisons import differences, forests
+from forestrl.publishing.endings import endings
 from forestrl.publishing.reproduction import reproduction, verdict
 from forestrl.publishing.results import read_results
 from forestrl.publishing.statistics import Interval
+from forestrl.publishing.summary import summary
 from forestrl.publishing.tables import Column, headline, markdown
 from tests.publishing.folders import write_evaluation
 
@@ -124,3 +126,43 @@ def test_other_forests(tmp_path):
     row = cells(table, "h = 75, 101 trunks")
     assert row["coverage at the end"] == "60.0 ± 1.0" and row["coverage at 5000"] == "–"
     assert not math.isnan(float(row["steps"]))
+
+
+def test_endings_say_who_is_stuck_and_why(tmp_path):
+    stuck = {"covered": 0.75, "cycle": 0.25}
+    write_evaluation(tmp_path, name="cost_published", coverage=(1, 1, 1, 0.05), endings=stuck)
+    half = {"covered": 0.5, "budget": 0.5}
+    write_evaluation(tmp_path, coverage=(0.99, 0.09), endings=half)
+    write_evaluation(tmp_path, name="learned_seed1", coverage=(0.99, 0.99))
+    table = endings(read_results(tmp_path))
+    assert cells(table, "GATv2 and PPO") == {
+        "policy": "GATv2 and PPO",
+        "runs": "4",
+        "reached 98 %": "75.0",
+        "still exploring": "25.0",
+        "in a cycle": "0",
+        "goal is its own cell": "0",
+        "sees no goal in reach": "0",
+        "coverage of the others": "9.0",
+    }
+    planner = cells(table, "cost-based, as published")
+    assert (planner["in a cycle"], planner["coverage of the others"]) == ("25.0", "5.0")
+    elsewhere = cells(table, "*Explore-Bench's own simulator: cost-based*")
+    assert (elsewhere["reached 98 %"], elsewhere["goal is its own cell"]) == ("65.0", "7.5")
+
+
+def test_the_summary_names_wins_and_losses(tmp_path):
+    write_evaluation(tmp_path, coverage=(0.99, 0.97), rate=0.3, endings={})
+    write_evaluation(tmp_path, name="random", coverage=(0.5, 0.05), rate=0.0)
+    write_evaluation(tmp_path, name="nearest_frontier", coverage=(1.0, 0.98), rate=0.0)
+    reproduced, ahead, behind, speed = summary(read_results(tmp_path), "learned").splitlines()
+    assert "4 of the 5 statements" in reproduced
+    assert reproduced.endswith("Not reached: interventions, mean (paper 10 %).")
+    assert ahead.endswith("in percentage points: random walk (+70.5 ± 21.5).")
+    assert behind.endswith("in percentage points: nearest frontier (−1.0 ± 0.0).")
+    assert "nearest frontier reaches 98 % in every run, after 400 ± 10 steps" in speed
+
+
+def test_without_the_learned_policy_there_is_no_summary(tmp_path):
+    write_evaluation(tmp_path, name="random")
+    assert summary(read_results(tmp_path), "learned") == ""
