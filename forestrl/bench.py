@@ -15,6 +15,7 @@ from torchrl.envs import Compose, TransformedEnv
 from tqdm.auto import tqdm
 
 from forestrl import build
+from forestrl.benchmark.compiled import measure_compiled, write_compiled
 from forestrl.benchmark.machine import describe_machine
 from forestrl.benchmark.report import write_report
 from forestrl.benchmark.run import Makers, run
@@ -96,7 +97,7 @@ def measure(cfg: DictConfig, folder: Path) -> list[str]:
         window=cfg.graph.window,
     )
     more = (list(settings.scaling_sizes), list(settings.scaling_num_envs))
-    total = len(sizes) * (len(num_envs) + 1) + settings.scaling * len(more[0]) * len(more[1])
+    total = len(sizes) * (len(num_envs) + 2) + settings.scaling * len(more[0]) * len(more[1])
     about = describe_machine() | {"kernel": cfg.model.kernel, "device": cfg.device}
     with tqdm(total=total, disable=not sys.stderr.isatty()) as bar:
 
@@ -106,6 +107,8 @@ def measure(cfg: DictConfig, folder: Path) -> list[str]:
 
         rows = run(makers, sizes, num_envs, settings.seconds, progress)
         texts = [write_report(rows, about, folder)]
+        gains = measure_compiled(makers, sizes, settings.seconds, progress)
+        texts.append(write_compiled(gains, folder))
         if settings.scaling:
             costs = measure_scaling(makers, *more, settings.seconds, progress)
             texts.append(write_scaling(costs, folder))

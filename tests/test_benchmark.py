@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from forestrl import functional as F
+from forestrl import kernels
 from forestrl import keys as K
 from forestrl.benchmark.states import arrange, enter, explore
 from forestrl.benchmark.timing import measure
@@ -106,6 +107,26 @@ def test_table_names_machine_and_versions(result):
     assert machine["torch"] == torch.__version__
     assert all(name in output and value in output for name, value in machine.items())
     assert (folder / "bench.txt").read_text().strip() in output
+
+
+def test_every_compiled_function_is_set_beside_its_reference(result):
+    folder, output, _ = result
+    rows = read(folder / "compiled.csv")
+    assert [row["function"] for row in rows] == [
+        "sense",
+        "exploration_graph",
+        "potential",
+        "path_lengths",
+        "component",
+        "largest_component",
+        "GATv2 forward + backward",
+    ]
+    assert {row["function"] for row in rows[:-1]} == set(kernels.__all__)
+    for row in rows:
+        ratio = float(row["reference"]) / float(row["compiled"])
+        assert float(row["ratio"]) == pytest.approx(ratio, rel=1e-4)
+        assert int(row["batch"]) == (64 if row["function"] in kernels.__all__ else 16)
+    assert (folder / "compiled.txt").read_text().rstrip() in output
 
 
 def test_scaling_has_a_row_for_every_stage_size_and_number_of_arenas(result):
