@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from torchrl.collectors import Collector
 from torchrl.envs import Compose, EnvBase, RewardSum, TransformedEnv
 
 from forestrl.envs import StaggeredEpisodes
+from forestrl.kernels.sensing import are_compiled
 from forestrl.loggers import CsvLogger, Logger, Loggers, NoLogger, TensorboardLogger, WandbLogger
 from forestrl.policies.learned import ActorCritic
 from forestrl.policies.released import RELEASED, Policy, find_policy, load_policy, require_same
@@ -35,6 +37,8 @@ def prepare(cfg: DictConfig) -> None:
         raise ConfigError(f"seed={cfg.seed} is not allowed: it must be 0 or more")
     torch.set_num_threads(cfg.threads)
     numba.set_num_threads(min(cfg.threads, numba.config.NUMBA_NUM_THREADS))
+    if not are_compiled():
+        print("compiling for this machine: half a minute, the first time only", file=sys.stderr)
     try:
         torch.zeros(1, device=cfg.device)
     except (RuntimeError, AssertionError) as error:

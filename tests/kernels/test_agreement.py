@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 import torch
 from hypothesis import given
@@ -21,6 +25,17 @@ from tests.states import (
     tensors_of,
     worlds,
 )
+
+COMPILE = """
+import torch
+from forestrl import functional as F, kernels
+from forestrl.kernels.sensing import are_compiled
+assert not are_compiled()
+free = torch.ones(3, 3, dtype=torch.bool)
+cells, position = torch.zeros(3, 3, dtype=torch.uint8), torch.tensor([1, 1])
+kernels.sense(~free, free, cells, position, F.sight_lines(2.0))
+assert are_compiled()
+"""
 
 TESTED = {
     "exploration_graph",
@@ -162,3 +177,8 @@ def test_compiled_functions_leave_their_inputs_as_they_were():
     kernels.sense(trees, ~trees, cells, position, F.sight_lines(5.0))
     for now, then in zip((trees, cells, position, free), before, strict=True):
         assert torch.equal(now, then)
+
+
+def test_kernels_are_compiled_once_for_all_processes(tmp_path):
+    folder = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path))
+    subprocess.run([sys.executable, "-c", COMPILE], env=folder, check=True)
