@@ -8,6 +8,7 @@ from tensordict import TensorDict
 
 from forestrl import keys as K
 from forestrl.evaluation import arenas, uniforms
+from forestrl.kernels.planning import Reason
 from forestrl.rendering import draw_frame, record_episode, write_gif
 from forestrl.rendering import panel as P
 from forestrl.rendering.frame import _GAP, _HEAD
@@ -92,6 +93,17 @@ def test_graph_edges_are_drawn_when_there_is_a_graph():
         return (np.asarray(panel) == P.EDGE).all(-1).sum()
 
     assert edge_pixels(bare) == 0 and edge_pixels(graph) > 100
+
+
+@pytest.mark.parametrize(("reason", "more"), [(Reason.EXPLORING, False), (Reason.CYCLE, True)])
+def test_the_caption_says_why_a_planner_stopped(reason, more):
+    def ink(td):
+        frame = draw_frame(td, scale=2 * SCALE)
+        caption = np.asarray(frame)[_HEAD + 2 * SIDE * SCALE + 4 :, : 2 * (_GAP + 2 * SIDE * SCALE)]
+        return (caption == P.INK).all(-1).sum()
+
+    planned = state().set(K.REASON, torch.tensor(reason, dtype=torch.int8))
+    assert (ink(planned) > ink(state())) == more
 
 
 @pytest.mark.parametrize(("size", "scale"), [(5, 4), (16, 7), (50, 7), (100, 4)])

@@ -67,6 +67,9 @@ def draw_frame(
     words = (f"step {scene.step}", f"coverage {scene.coverage:.1%}", f"interventions {len(marks)}")
     caption = "    ".join(words).replace("%", " %")
     fits = wide >= _CAPTION  # else it stands below the legend, not beside it
+    more = f"{caption}    stopped: {scene.stopped}"
+    if scene.stopped and pen.textlength(more, font) <= (wide if fits else width) - _GAP:
+        caption = more
     bottom = _HEAD + panels["Agent's map"].height + _FOOT if fits else height
     pen.text((_GAP, bottom - _FOOT / 2), caption, P.INK, font, anchor="lm")
     return frame
