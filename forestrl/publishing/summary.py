@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from forestrl.publishing.comparisons import paired
 from forestrl.publishing.reproduction import measured
-from forestrl.publishing.results import Method, Results
+from forestrl.publishing.results import Evaluation, Method, Results
 from forestrl.publishing.statistics import Difference, Interval
 from forestrl.publishing.tables import LABELS, ordered
 
@@ -30,6 +32,7 @@ def summary(results: Results, policy: str) -> str:
         _reproduced(results, policy),
         _compared(methods, policy, ahead=True),
         _compared(methods, policy, ahead=False),
+        _overtaken(methods, policy),
         _fastest(methods, policy),
     )
     return "".join(f"- {part}\n" for part in parts if part)
@@ -66,6 +69,26 @@ def _compared(methods: dict[str, Method], policy: str, *, ahead: bool) -> str:
 def _points(difference: Difference) -> str:
     mean, margin = difference.interval.mean, difference.interval.margin
     return f"{100 * mean:+.1f} ± {100 * margin:.1f}".replace("-", "−")
+
+
+def _overtaken(methods: dict[str, Method], policy: str) -> str:
+    """The policies that it is ahead of at first and behind at the end, and until when."""
+    ours, texts = methods[policy].first, []
+    for name in ordered(methods.keys() - {policy, _PRIVILEGED}):
+        if (step := last_step_ahead(ours, methods[name].first)) is not None:
+            texts.append(f"{LABELS.get(name, name)} (to step {step})")
+    return f"**Ahead at first**, in mean coverage: {_listed(texts)}." if texts else ""
+
+
+def last_step_ahead(ours: Evaluation, theirs: Evaluation) -> int | None:
+    """Gives the last step at which our mean coverage is higher; None if never, or at the end."""
+    steps, mine, other = np.intersect1d(
+        ours.curve["step"], theirs.curve["step"], assume_unique=True, return_indices=True
+    )
+    (ahead,) = np.nonzero(ours.curve["mean"][mine] > theirs.curve["mean"][other])
+    if len(ahead) == 0 or ahead[-1] == len(steps) - 1:
+        return None
+    return int(steps[ahead[-1]])
 
 
 def _fastest(methods: dict[str, Method], policy: str) -> str:

@@ -9,7 +9,7 @@ from forestrl.publishing.endings import endings
 from forestrl.publishing.reproduction import reproduction, verdict
 from forestrl.publishing.results import read_results
 from forestrl.publishing.statistics import Interval
-from forestrl.publishing.summary import summary
+from forestrl.publishing.summary import last_step_ahead, summary
 from forestrl.publishing.tables import Column, headline, markdown
 from tests.publishing.folders import write_evaluation
 
@@ -161,6 +161,21 @@ def test_the_summary_names_wins_and_losses(tmp_path):
     assert ahead.endswith("in percentage points: random walk (+70.5 ± 21.5).")
     assert behind.endswith("in percentage points: nearest frontier (−1.0 ± 0.0).")
     assert "nearest frontier reaches 98 % in every run, after 400 ± 10 steps" in speed
+
+
+@pytest.mark.parametrize(
+    ("theirs", "step"),
+    [((0.4, 0.5, 0.9), 500), ((0.4, 0.6, 0.9), 0), ((0.5, 0.6, 0.9), None), ((0, 0.9, 0), None)],
+)
+def test_the_last_step_ahead(tmp_path, theirs, step):
+    folders = [write_evaluation(tmp_path, name=name) for name in ("learned", "random")]
+    for folder, curve in zip(folders, ((0.5, 0.6, 0.7), theirs), strict=True):
+        rows = [f"{at},{x},{x},{x}" for at, x in zip((0, 500, 2500), curve, strict=True)]
+        (folder / "curve.csv").write_text("\n".join(["step,mean,low,high", *rows]) + "\n")
+    methods = read_results(tmp_path).settings["nominal"]
+    assert last_step_ahead(methods["learned"].first, methods["random"].first) == step
+    found = f"random walk (to step {step})" in summary(read_results(tmp_path), "learned")
+    assert found == (step is not None)
 
 
 def test_without_the_learned_policy_there_is_no_summary(tmp_path):
