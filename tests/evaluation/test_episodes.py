@@ -1,5 +1,6 @@
 """Episodes by hand, and the same in any company."""
 
+import gc
 from dataclasses import fields
 
 import numpy as np
@@ -11,6 +12,7 @@ from forestrl import keys as K
 from forestrl.envs import ExplorationGraph, ForestEnv
 from forestrl.evaluation import Episodes, evaluate, uniforms
 from forestrl.evaluation.arenas import draw_arenas as arenas_of
+from forestrl.policies.classical import CostBased, NearestFrontier
 from tests.evaluation.policies import always, forest, meadow, random_action, random_logits
 
 SIDE = 9  # of the meadow
@@ -48,6 +50,20 @@ def test_an_arena_fares_the_same_alone_and_among_a_hundred(policy):
     alone = run(forest, policy, indices=[7], steps=60)
     among = run(forest, policy, indices=range(100), steps=60, batch=100)
     assert_same(alone, among, slice(7, 8))
+
+
+@pytest.mark.parametrize("policy", [random_logits, NearestFrontier(), CostBased()])
+def test_an_episode_keeps_no_tensor_of_the_steps_behind_it(policy):
+    alive = []
+
+    def weigh(done):
+        if done in (4 * 30, 4 * 90):
+            tensors = [x for x in gc.get_objects() if issubclass(type(x), torch.Tensor)]
+            storages = {x.untyped_storage().data_ptr(): x.untyped_storage() for x in tensors}
+            alive.append(sum(storage.nbytes() for storage in storages.values()))
+
+    run(forest, policy, indices=range(4), steps=100, progress=weigh)
+    assert alive[0] == alive[1] > 0
 
 
 def test_batches_do_not_matter_even_if_the_last_is_smaller():
