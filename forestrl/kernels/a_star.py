@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from forestrl.functional import Cell
-from forestrl.kernels.planning import eight_steps
+from forestrl.kernels.flood import eight_steps
 
 _FREE = int(Cell.FREE)
 _ROOM = 512  # entries of the heap at first

@@ -12,19 +12,14 @@ from torch import Tensor
 from forestrl.functional import Cell
 from forestrl.kernels.a_star import a_star_action
 from forestrl.kernels.clusters import clusters, published_frontier
+from forestrl.kernels.flood import PAD, eight_steps, flood, no_lengths, pad, walk
 from forestrl.kernels.planning import (
     EXPLORING,
     NO_REACHABLE_FRONTIER,
-    PAD,
     Reason,
     arguments,
-    eight_steps,
     flat,
-    flood,
-    no_lengths,
-    pad,
     reason_to_end,
-    walk,
 )
 
 _FREE = int(Cell.FREE)

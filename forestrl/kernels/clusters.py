@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from forestrl.functional import Cell
-from forestrl.kernels.planning import PAD
+from forestrl.kernels.flood import PAD
 
 _UNKNOWN, _FREE = int(Cell.UNKNOWN), int(Cell.FREE)
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from forestrl.kernels.planning import PAD, eight_steps, pad, walk
+from forestrl.kernels.flood import PAD, eight_steps, pad, walk
 
 NEVER = 1 << 30  # later than any step
 

@@ -16,17 +16,8 @@ from torch import Tensor
 from forestrl.functional import Cell
 from forestrl.kernels.benchmarks import towards
 from forestrl.kernels.clusters import clusters, mended_frontier
-from forestrl.kernels.planning import (
-    PAD,
-    arguments,
-    eight_steps,
-    flat,
-    flood,
-    no_lengths,
-    pad,
-    reason_to_end,
-    walk,
-)
+from forestrl.kernels.flood import PAD, eight_steps, flood, no_lengths, pad, walk
+from forestrl.kernels.planning import arguments, flat, reason_to_end
 
 _UNKNOWN, _FREE = int(Cell.UNKNOWN), int(Cell.FREE)
 _PENALTY = 5.0  # of a cell, for each time it is in the virtual path

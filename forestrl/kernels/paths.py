@@ -1,4 +1,4 @@
-"""Flood fills, compiled: components and path lengths in time linear in the cells reached."""
+"""Components and path lengths, compiled: flood fills, in time linear in the cells reached."""
 
 from __future__ import annotations
 
@@ -8,67 +8,45 @@ from numba import njit, prange
 from torch import Tensor
 
 from forestrl.functional import gather
-
-
-@njit(cache=True)
-def _flood(free: np.ndarray, lengths: np.ndarray, row: int, col: int, queue: np.ndarray) -> int:
-    """Walks breadth-first from a cell and returns how many cells it reached.
-
-    Writes the number of moves to each cell where ``lengths`` is negative; lists them in ``queue``.
-    """
-    height, width = free.shape
-    queue[0] = row * width + col
-    lengths[row, col] = 0
-    head, tail = 0, 1
-    while head < tail:
-        r, c = queue[head] // width, queue[head] % width
-        head += 1
-        for near_r in range(max(r - 1, 0), min(r + 2, height)):
-            for near_c in range(max(c - 1, 0), min(c + 2, width)):
-                if free[near_r, near_c] and lengths[near_r, near_c] < 0:
-                    lengths[near_r, near_c] = lengths[r, c] + 1
-                    queue[tail] = near_r * width + near_c
-                    tail += 1
-    return tail
+from forestrl.kernels.flood import PAD, UNREACHED, eight_steps, flood, no_lengths, pad, walk
 
 
 @njit(cache=True, parallel=True)
-def _path_lengths(free: np.ndarray, source: np.ndarray, out: np.ndarray) -> None:
-    height, width = free.shape[1:]
-    for b in prange(len(free)):
-        lengths = np.full((height, width), -1, np.int32)
-        queue = np.empty(height * width, np.int64)
-        for i in range(_flood(free[b], lengths, source[b, 0], source[b, 1], queue)):
-            r, c = queue[i] // width, queue[i] % width
-            out[b, r, c] = lengths[r, c]
+def _path_lengths(cells: np.ndarray, source: np.ndarray, out: np.ndarray) -> None:
+    stride = cells.shape[2] + 2 * PAD
+    for b in prange(len(cells)):
+        start = (source[b, 0] + PAD) * stride + source[b, 1] + PAD
+        lengths, queue, reached = walk(pad(cells[b]), eight_steps(stride), start)
+        for i in range(reached):
+            out[b, queue[i] // stride - PAD, queue[i] % stride - PAD] = lengths[queue[i]]
 
 
 @njit(cache=True, parallel=True)
-def _largest_components(free: np.ndarray, out: np.ndarray) -> None:
-    height, width = free.shape[1:]
-    for b in prange(len(free)):
-        lengths = np.full((height, width), -1, np.int32)
-        queue = np.empty(height * width, np.int64)
+def _largest_components(cells: np.ndarray, out: np.ndarray) -> None:
+    stride = cells.shape[2] + 2 * PAD
+    for b in prange(len(cells)):
+        grid, steps = pad(cells[b]), eight_steps(stride)
+        lengths, queue = no_lengths(grid), np.empty(len(grid), np.int32)
         best_size, best_last, best_cell = 0, 0, -1
-        for r in range(height):
-            for c in range(width):
-                if free[b, r, c] and lengths[r, c] < 0:
-                    size = _flood(free[b], lengths, r, c, queue)
-                    last = queue[:size].max()
-                    if size > best_size or (size == best_size and last < best_last):
-                        best_size, best_last, best_cell = size, last, r * width + c
+        for cell in range(len(grid)):
+            if lengths[cell] == UNREACHED:
+                lengths[cell], queue[0] = 0, cell
+                _, size = flood(steps, lengths, queue, 0, 1, 0)
+                last = queue[:size].max()
+                if size > best_size or (size == best_size and last < best_last):
+                    best_size, best_last, best_cell = size, last, cell
         if best_size > 0:
-            lengths[:] = -1
-            size = _flood(free[b], lengths, best_cell // width, best_cell % width, queue)
+            _, queue, size = walk(grid, steps, best_cell)
             for i in range(size):
-                out[b, queue[i] // width, queue[i] % width] = True
+                out[b, queue[i] // stride - PAD, queue[i] % stride - PAD] = True
 
 
 def path_lengths(free: Tensor, source: Tensor) -> Tensor:
     """:func:`forestrl.functional.path_lengths`, compiled."""
     grids = free.reshape(-1, *free.shape[-2:]).contiguous()
     out = torch.full(grids.shape, torch.inf)
-    _path_lengths(grids.numpy(), source.reshape(-1, 2).contiguous().numpy(), out.numpy())
+    cells = grids.view(torch.uint8).numpy()  # a free cell is 1 in both
+    _path_lengths(cells, source.reshape(-1, 2).contiguous().numpy(), out.numpy())
     return out.view(free.shape)
 
 
@@ -82,5 +60,5 @@ def largest_component(free: Tensor) -> Tensor:
     """:func:`forestrl.functional.largest_component`, compiled."""
     grids = free.reshape(-1, *free.shape[-2:]).contiguous()
     out = torch.zeros_like(grids)
-    _largest_components(grids.numpy(), out.numpy())
+    _largest_components(grids.view(torch.uint8).numpy(), out.numpy())
     return out.view(free.shape)

@@ -1,9 +1,4 @@
-"""What the compiled planners share: padded maps, flood fills, first moves; and information gain.
-
-A planner's map is flat and has ``PAD`` cells of obstacle around the arena, so that no index needs a
-check: the arena is walled. A cell of it is the number ``(row + PAD) * stride + col + PAD`` with
-``stride = width + 2 * PAD``; its order is row-major.
-"""
+"""What the compiled planners share: first moves, reasons to end; and information gain."""
 
 from __future__ import annotations
 
@@ -16,10 +11,9 @@ from numba import njit, prange
 from torch import Tensor
 
 from forestrl.functional import Cell
+from forestrl.kernels.flood import PAD, eight_steps, pad, walk
 
-PAD = 2
-_UNKNOWN, _FREE, _OCCUPIED = int(Cell.UNKNOWN), int(Cell.FREE), int(Cell.OCCUPIED)
-_UNREACHED, _BLOCKED = -1, -2  # in place of a path length
+_UNKNOWN, _FREE = int(Cell.UNKNOWN), int(Cell.FREE)
 _MARK = 1 << 24  # more than any path length
 
 
@@ -44,75 +38,6 @@ class Reason(IntEnum):
 
 EXPLORING, COVERED = int(Reason.EXPLORING), int(Reason.COVERED)
 NO_REACHABLE_FRONTIER = int(Reason.NO_REACHABLE_FRONTIER)
-
-
-@njit(cache=True)
-def pad(cells: np.ndarray) -> np.ndarray:
-    """Lays a map out flat with obstacles around it."""
-    height, width = cells.shape
-    stride = width + 2 * PAD
-    grid = np.full((height + 2 * PAD) * stride, _OCCUPIED, np.uint8)
-    for r in range(height):
-        for c in range(width):
-            grid[(r + PAD) * stride + c + PAD] = cells[r, c]
-    return grid
-
-
-@njit(cache=True)
-def eight_steps(stride: int) -> np.ndarray:
-    """Differences of cell number to the eight neighbours, in the order of actions 1 to 8."""
-    s = stride
-    return np.array([-s - 1, -s, -s + 1, -1, 1, s - 1, s, s + 1], np.int32)
-
-
-@njit(cache=True)
-def no_lengths(grid: np.ndarray) -> np.ndarray:
-    """Gives the path lengths before a walk: negative, and different where no walk leads."""
-    lengths = np.empty(len(grid), np.int32)
-    for cell in range(len(grid)):
-        lengths[cell] = _UNREACHED if grid[cell] == _FREE else _BLOCKED
-    return lengths
-
-
-@njit(cache=True)
-def flood(
-    steps: np.ndarray, lengths: np.ndarray, queue: np.ndarray, head: int, tail: int, target: int
-) -> tuple[int, int]:
-    """Goes on with a breadth-first walk over free cells until it has reached a cell, or all.
-
-    Args:
-        steps: differences of cell number to the neighbours.
-        lengths: moves to each cell, of :func:`no_lengths` where not yet reached; written.
-        queue: reached cells in the order of their lengths; written.
-        head: how many of them have been passed.
-        tail: how many there are.
-        target: the cell; one of the padding for a walk to the end.
-
-    Returns:
-        the new ``head`` and ``tail``.
-    """
-    while head < tail and lengths[target] < 0:
-        cell = queue[head]
-        head += 1
-        length = lengths[cell] + 1
-        for step in steps:
-            near = np.uint64(cell + step)  # unsigned: spares numba a check for negative indices
-            if lengths[near] == _UNREACHED:
-                lengths[near] = length
-                queue[tail] = near
-                tail += 1
-    return head, tail
-
-
-@njit(cache=True)
-def walk(grid: np.ndarray, steps: np.ndarray, source: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """Walks breadth-first from a cell to the end: lengths, the cells reached, how many."""
-    lengths = no_lengths(grid)
-    queue = np.empty(len(grid), np.int32)
-    lengths[source] = 0
-    queue[0] = source
-    _, tail = flood(steps, lengths, queue, 0, 1, 0)
-    return lengths, queue, tail
 
 
 @njit(cache=True)
