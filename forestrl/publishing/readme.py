@@ -10,6 +10,7 @@ from pathlib import Path
 from forestrl.publishing.comparisons import differences, forests
 from forestrl.publishing.endings import endings
 from forestrl.publishing.files import ResultError
+from forestrl.publishing.kernels import kernels
 from forestrl.publishing.panel import Panel
 from forestrl.publishing.reproduction import reproduction
 from forestrl.publishing.results import FIGURES, Evaluation, Results, Training
@@ -62,7 +63,7 @@ _APART = "differences"
 
 
 def tables(results: Results, policy: str, ablations: str) -> dict[str, str]:
-    """Writes ``table.md`` and ``differences.md``; a part without any data is left out.
+    """Writes ``table.md``, ``differences.md`` and ``kernels.md``; what has no data is empty.
 
     Args:
         results: what was read.
@@ -71,7 +72,8 @@ def tables(results: Results, policy: str, ablations: str) -> dict[str, str]:
     """
     found = _tables(results, policy, ablations)
     pairs = found.pop(_APART, "")
-    return {"table.md": "\n".join(found.values()), "differences.md": pairs}
+    main = "\n".join(found.values())
+    return {"table.md": main, "differences.md": pairs, "kernels.md": kernels(results)}
 
 
 def _tables(results: Results, policy: str, ablations: str) -> dict[str, str]:

@@ -23,7 +23,7 @@ SETTINGS = {
     "size100": (100, 180),
 }
 """Arena side and number of trunks of each setting (Fig. 3 and 4); size* run 10,000 steps."""
-TRAINING, FIGURES, ABLATIONS = "training", "figures", "ablations"
+TRAINING, REFERENCE, FIGURES, ABLATIONS = "training", "training_pyg", "figures", "ablations"
 """Folders beside the settings."""
 
 _EPISODES = ("index", "coverage", "intervention_rate", "steps_to_98")
@@ -114,6 +114,8 @@ class Results:
     """Methods by setting and name."""
     training: dict[int, Training]
     """Trainings by seed."""
+    reference: dict[int, Training]
+    """Trainings with PyTorch Geometric's layers, by seed."""
 
     def method(self, setting: str, name: str) -> Method | None:
         """Gives a method's evaluations in a setting, if there are any."""
@@ -128,8 +130,8 @@ def read_results(folder: Path) -> Results:
     """
     found = sorted(folder.glob("*/*/summary.json")) + sorted(folder.glob("*/*/episodes.csv"))
     folders = sorted({path.parent for path in found})
-    paths = sorted((folder / TRAINING).glob("seed*.csv"))
-    if not folders and not paths:
+    training, reference = (_read_trainings(folder / name) for name in (TRAINING, REFERENCE))
+    if not folders and not training:
         raise ResultError(
             f"{folder} holds no results: it wants <setting>/<policy>/"
             "{summary.json,episodes.csv,curve.csv} and training/seed<N>.csv"
@@ -140,7 +142,7 @@ def read_results(folder: Path) -> Results:
         name, seed = (match["name"], int(match["seed"])) if match else (each.name, 0)
         methods = settings.setdefault(each.parent.name, {})
         methods.setdefault(name, Method(name, {})).seeds[seed] = read_evaluation(each)
-    return Results(folder, settings, {_seed(path): _read_training(path) for path in paths})
+    return Results(folder, settings, training, reference)
 
 
 def read_evaluation(folder: Path) -> Evaluation:
@@ -192,8 +194,10 @@ def measure(summary: dict[str, Any], name: str) -> Interval | None:
     return Interval((summary if name == "collisions" else summary["interventions"])[name])
 
 
-def _read_training(path: Path) -> Training:
-    return Training(path, read_columns(path, ("frames", "rollout/return")))
+def _read_trainings(folder: Path) -> dict[int, Training]:
+    needed = ("frames", "rollout/return")
+    paths = sorted(folder.glob("seed*.csv"))
+    return {_seed(path): Training(path, read_columns(path, needed)) for path in paths}
 
 
 def _seed(path: Path) -> int:

@@ -54,10 +54,12 @@ def write_evaluation(
 def write_training(path: Path, returns=(0.0, 50.0, 100.0), evaluated=()):
     """A row each 1000 frames; the evaluations' coverage in the last rows."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = ["frames,rollout/return,eval/coverage,eval/auc,eval/collisions"]
+    lines = ["frames,rollout/return,rollout/coverage,eval/coverage,eval/auc,eval/collisions"]
     blank = len(returns) - len(evaluated)
     for i, value in enumerate(returns):
         coverage = evaluated[i - blank] if i >= blank else ""
-        lines.append(f"{1000 * (i + 1)},{value},{coverage},{coverage},{0 if i >= blank else ''}")
+        collisions = 0 if i >= blank else ""
+        row = (1000 * (i + 1), value, value / 100, coverage, coverage, collisions)
+        lines.append(",".join(map(str, row)))
     path.write_text("\n".join(lines) + "\n")
     return path

@@ -6,12 +6,13 @@ import pytest
 
 from forestrl.publishing.comparisons import differences, forests
 from forestrl.publishing.endings import endings
+from forestrl.publishing.kernels import kernels
 from forestrl.publishing.reproduction import reproduction, verdict
 from forestrl.publishing.results import read_results
 from forestrl.publishing.statistics import Interval
 from forestrl.publishing.summary import last_step_ahead, summary
 from forestrl.publishing.tables import Column, headline, markdown
-from tests.publishing.folders import write_evaluation
+from tests.publishing.folders import write_evaluation, write_training
 
 
 def cells(table, label):
@@ -181,3 +182,21 @@ def test_the_last_step_ahead(tmp_path, theirs, step):
 def test_without_the_learned_policy_there_is_no_summary(tmp_path):
     write_evaluation(tmp_path, name="random")
     assert summary(read_results(tmp_path), "learned") == ""
+
+
+def test_trainings_of_both_networks_are_set_side_by_side(tmp_path):
+    def write(group, seed, first, second):
+        write_training(tmp_path / group / f"seed{seed}.csv", [first] * 12 + [second] * 12)
+
+    write("training", 0, 10, 50), write("training", 1, 30, 70)
+    write("training_pyg", 0, 20, 80), write("training_pyg", 1, 40, 90)
+    rows = [line.strip("| ").split(" | ") for line in kernels(read_results(tmp_path)).splitlines()]
+    returns = ["rollout/return", "0 to 12,800", "20 (10 to 30)", "30 (20 to 40)", "yes"]
+    assert rows[2] == returns  # updates at 1000, 2000, ... frames
+    assert rows[3][1:] == ["12,800 to 25,600", "60 (50 to 70)", "85 (80 to 90)", "no"]
+    assert rows[5][2:4] == ["60.0 (50.0 to 70.0)", "85.0 (80.0 to 90.0)"]
+
+
+def test_without_trainings_of_both_networks_there_is_no_comparison(tmp_path):
+    write_training(tmp_path / "training" / "seed0.csv")
+    assert kernels(read_results(tmp_path)) == ""
