@@ -17,8 +17,9 @@ _PAIRED = (
 _FORESTS = (
     *(Column(f"coverage at {step}", f"coverage_{step}") for step in (500, 1000, 2500, 5000)),
     Column("coverage at the end", "coverage_end"),
-    Column("interventions", "intervention_rate", best=min),
-    Column("their 80th percentile", "percentile_80", best=min),
+    Column("reached 98 %", "reached_98"),
+    Column("stuck", "stuck"),
+    Column("interventions", "intervention_rate"),
 )
 
 

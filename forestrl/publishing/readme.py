@@ -49,7 +49,7 @@ interval excludes 0 in favour of the first; *italics*: in favour of the other.
 """,
     "forests": """### Denser and larger forests
 
-Coverage and interventions in per cent; ± as above.
+In per cent; ± as above. "Stuck": neither at 98 % nor still exploring.
 """,
     "ablations": """### What each part is good for
 

@@ -175,8 +175,8 @@ def measure(summary: dict[str, Any], name: str) -> Interval | None:
     Args:
         summary: of an evaluation.
         name: ``coverage_<step>`` or ``coverage_end``, ``area_<upto>``, ``steps_to_<level>``,
-            ``reached_<level>``, ``intervention_rate``, ``percentile_80``, ``share_under_15`` or
-            ``collisions``.
+            ``reached_<level>``, ``stuck`` (neither covered nor exploring), ``intervention_rate``,
+            ``percentile_80``, ``share_under_15`` or ``collisions``.
     """
     kind, _, level = name.rpartition("_")
     if kind == "coverage":
@@ -189,9 +189,17 @@ def measure(summary: dict[str, Any], name: str) -> Interval | None:
     if kind == "reached":
         entry = summary["steps_to"].get(level)
         return None if entry is None else Interval(entry["reached"])
+    if name == "stuck":
+        ways = summary.get("endings")
+        return None if ways is None else Interval(sum(ways.values()) - _moving(ways))
     if name == "intervention_rate":
         return _interval(summary["interventions"]["rate"])
     return Interval((summary if name == "collisions" else summary["interventions"])[name])
+
+
+def _moving(endings: dict[str, float]) -> float:
+    """The share of the runs that covered the forest or were still exploring it."""
+    return endings.get("covered", 0.0) + endings.get("budget", 0.0)
 
 
 def _read_trainings(folder: Path) -> dict[int, Training]:
