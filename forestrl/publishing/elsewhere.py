@@ -26,14 +26,31 @@ def _numbers(**values: float) -> dict[str, Interval]:
     return {name: Interval(value) for name, value in values.items()}
 
 
-def _normal(mean: float, standard_error: float) -> Interval:
-    """The 95 % interval of a mean whose standard error is known."""
-    return Interval(mean, mean - 1.96 * standard_error, mean + 1.96 * standard_error)
-
-
 _SIMULATOR = "Explore-Bench's own simulator"
+_SIMULATED: dict[str, dict[str, float]] = {
+    "cost-based": {
+        "covered": 26 / 40,
+        "cycle": 10 / 40,
+        "at_goal": 3 / 40,
+        "no_reachable_frontier": 1 / 40,
+    },
+    "MMPF": {"covered": 19 / 40, "cycle": 19 / 40, "goal_not_free": 2 / 40},
+}
 _PLAIN = "a plain program"
 _LEARNED = _numbers(intervention_rate=P.INTERVENTION_RATE, percentile_80=P.INTERVENTION_LIMIT)
+
+
+def _simulated(
+    planner: str, early: tuple[float, float], *, end: float, standard_error: float
+) -> Elsewhere:
+    """A planner in the simulator: coverage at 250 and 500 steps, and from 1000 on."""
+    margin = 1.96 * standard_error
+    values = _numbers(coverage_250=early[0], coverage_500=early[1])
+    values |= _numbers(coverage_1000=end, coverage_2000=end)
+    values |= {"coverage_2500": Interval(end, end - margin, end + margin)}
+    values |= _numbers(reached_98=_SIMULATED[planner]["covered"])
+    return Elsewhere(f"{_SIMULATOR}: {planner}", "40 arenas", values)
+
 
 BESIDE: dict[str, tuple[Elsewhere, ...]] = {
     "learned_mode": (
@@ -45,23 +62,11 @@ BESIDE: dict[str, tuple[Elsewhere, ...]] = {
     ),
     "cost_mended": (
         Elsewhere("paper: cost-based", "", _numbers(coverage_2500=P.BENCHMARKS["cost"])),
-        Elsewhere(
-            f"{_SIMULATOR}: cost-based",
-            "40 arenas",
-            _numbers(coverage_250=0.632, coverage_500=0.822, coverage_1000=0.825)
-            | _numbers(coverage_2000=0.825, reached_98=26 / 40)
-            | {"coverage_2500": _normal(0.825, 0.050)},
-        ),
+        _simulated("cost-based", (0.632, 0.822), end=0.825, standard_error=0.050),
     ),
     "mmpf_mended": (
         Elsewhere("paper: MMPF", "", _numbers(coverage_2500=P.BENCHMARKS["mmpf"])),
-        Elsewhere(
-            f"{_SIMULATOR}: MMPF",
-            "40 arenas",
-            _numbers(coverage_250=0.707, coverage_500=0.802, coverage_1000=0.803)
-            | _numbers(coverage_2000=0.803, reached_98=19 / 40)
-            | {"coverage_2500": _normal(0.803, 0.041)},
-        ),
+        _simulated("MMPF", (0.707, 0.802), end=0.803, standard_error=0.041),
     ),
     "nearest_frontier": (
         Elsewhere(
@@ -93,19 +98,8 @@ cells; trunks there have integer centres and radii. The plain program was writte
 and run in 300 other forests of Table III; its rule for ties is not ours.
 """
 
-ENDINGS: dict[str, tuple[str, dict[str, float]]] = {
-    "cost_published": (
-        f"{_SIMULATOR}: cost-based",
-        {
-            "covered": 26 / 40,
-            "cycle": 10 / 40,
-            "at_goal": 3 / 40,
-            "no_reachable_frontier": 1 / 40,
-        },
-    ),
-    "mmpf_published": (
-        f"{_SIMULATOR}: MMPF",
-        {"covered": 19 / 40, "cycle": 19 / 40, "goal_not_free": 2 / 40},
-    ),
+ENDINGS = {
+    "cost_published": (f"{_SIMULATOR}: cost-based", _SIMULATED["cost-based"]),
+    "mmpf_published": (f"{_SIMULATOR}: MMPF", _SIMULATED["MMPF"]),
 }
 """How the same 40 runs ended, after the row of the planner that does the same here."""
