@@ -201,7 +201,9 @@ def test_every_experiment_composes(experiment, job):
         name, value = override.split("=")
         if name not in ("env", "ablation"):
             assert str(OmegaConf.select(cfg, name)) == value
-    if experiment not in ("smoke", "ablations"):
+    if experiment == "ablations":  # measured at the end, and only there
+        assert cfg.total_frames == cfg.eval.every == 50 * cfg.algo.frames_per_batch
+    elif experiment != "smoke":
         assert cfg.total_frames == 400_000
 
 

@@ -12,6 +12,7 @@ from forestrl.kernels.planning import Reason
 from forestrl.rendering import draw_frame, record_episode, write_gif
 from forestrl.rendering import panel as P
 from forestrl.rendering.frame import _GAP, _HEAD
+from forestrl.rendering.scene import Scene
 from tests.drawing import situation
 from tests.evaluation.policies import forest, random_action, random_logits
 
@@ -103,6 +104,7 @@ def test_the_caption_says_why_a_planner_stopped(reason, more):
         return (caption == P.INK).all(-1).sum()
 
     planned = state().set(K.REASON, torch.tensor(reason, dtype=torch.int8))
+    assert Scene(planned).stopped == ("cycle" if more else "")
     assert (ink(planned) > ink(state())) == more
 
 

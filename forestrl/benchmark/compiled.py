@@ -57,7 +57,7 @@ def measure_compiled(
     Args:
         makers: builds what is measured.
         sizes: arena sides, cells.
-        seconds: budget for each function.
+        seconds: budget for each version of each function.
         progress: told what was measured.
     """
     gains = []

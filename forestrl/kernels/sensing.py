@@ -41,7 +41,7 @@ def _covered(cells: np.ndarray, traversable: np.ndarray) -> np.float32:
     for i in range(len(cells)):
         known = np.int32(known + np.int32(traversable[i] & (cells[i] == _FREE)))
         total = np.int32(total + np.int32(traversable[i]))
-    return np.float32(known) / np.float32(total)
+    return np.float32(known) / np.float32(total) if total > 0 else np.float32(np.nan)
 
 
 @njit(cache=True, parallel=True)
@@ -83,5 +83,11 @@ def sense(
 
 
 def are_compiled() -> bool:
-    """Tells whether an earlier process has left compiled kernels; else first uses take seconds."""
-    return any(Path(_sense.stats.cache_path).glob(f"{Path(__file__).stem}.*.nbi"))
+    """Tells whether an earlier process has left compiled kernels; else first uses take seconds.
+
+    Whether they are of this source and for this processor is not looked at.
+    """
+    stats = getattr(_sense, "stats", None)
+    if stats is None:  # numba was told not to compile
+        return True
+    return any(Path(stats.cache_path).glob(f"{Path(__file__).stem}.*.nbi"))

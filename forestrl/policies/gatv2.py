@@ -58,7 +58,7 @@ class GATv2Encoder(nn.Module):
                 msg = f"{name} must be at least 1, not {value}"
                 raise ValueError(msg)
         self.kernel = kernel
-        self.lidar_range = lidar_range if edge_lengths else math.inf
+        self.lidar_range = lidar_range if edge_lengths else math.inf  # the fixed edges' become 0
         self.edge_lengths = edge_lengths
         self.conv1 = GATv2Conv(F.FEATURES, hidden, heads=heads, edge_dim=1, add_self_loops=False)
         self.conv2 = GATv2Conv(heads * hidden, 1, edge_dim=1, add_self_loops=False)

@@ -35,10 +35,9 @@ def differences(results: Results, reference: str) -> str:
     ours, rows = methods[reference].first, []
     for name in ordered(methods.keys() - {reference}):
         theirs = methods[name].first
-        if _world(ours) == _world(theirs):
+        if (whole := paired("coverage", ours, theirs)) is not None:
             cells = [_difference(column, ours, theirs) for column in _PAIRED]
-            common = ours.by_arena("index").keys() & theirs.by_arena("index").keys()
-            rows.append([LABELS.get(name, f"`{name}`"), str(len(common)), *cells])
+            rows.append([LABELS.get(name, f"`{name}`"), str(whole.arenas), *cells])
     head = [f"{LABELS.get(reference, reference)} minus", "arenas", *(c.head for c in _PAIRED)]
     return markdown(head, rows) if rows else ""
 
@@ -52,7 +51,7 @@ def paired(column: str, ours: Evaluation, theirs: Evaluation) -> Difference | No
         theirs: the second.
 
     Returns:
-        None if they are not of the same arenas, or one of them lacks the column.
+        None if they are not of the same arenas, or there is no arena for which both have a number.
     """
     if _world(ours) != _world(theirs):
         return None

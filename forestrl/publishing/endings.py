@@ -14,10 +14,10 @@ from forestrl.publishing.tables import LABELS, markdown, ordered
 
 _HEADS = {
     "covered": "reached 98 %",
-    "budget": "still exploring",
+    "budget": "steps used up",
     "cycle": "in a cycle",
     "at_goal": "goal is its own cell",
-    "goal_not_free": "goal is a trunk",
+    "goal_not_free": "goal is no free cell",
     "no_reachable_frontier": "sees no goal in reach",
 }
 
@@ -33,7 +33,7 @@ def endings(results: Results) -> str:
     if not found:
         return ""
     beside = {name: ENDINGS[name] for name in found if name in ENDINGS}
-    there = [*found.values(), *(shares for _, shares in beside.values())]
+    there = [*found.values(), *(shares for _, _, shares in beside.values())]
     kinds = [kind for kind in _HEADS if any(shares.get(kind, 0) for shares in there)]
     rows = []
     for name, shares in found.items():
@@ -42,8 +42,8 @@ def endings(results: Results) -> str:
         cells = [*_cells(shares, kinds), _left_behind(method)]
         rows.append([LABELS.get(name, f"`{name}`"), str(runs), *cells])
         if name in beside:
-            label, theirs = beside[name]
-            rows.append([f"*{label}*", "40", *_cells(theirs, kinds), "–"])
+            label, runs, theirs = beside[name]
+            rows.append([f"*{label}*", str(runs), *_cells(theirs, kinds), "–"])
     head = ["policy", "runs", *(_HEADS[kind] for kind in kinds), "coverage of the others"]
     return markdown(head, rows)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from forestrl.publishing.comparisons import differences, forests
 from forestrl.publishing.endings import endings
 from forestrl.publishing.files import ResultError
-from forestrl.publishing.kernels import kernels
+from forestrl.publishing.learning import learning
 from forestrl.publishing.panel import Panel
 from forestrl.publishing.reproduction import reproduction
 from forestrl.publishing.results import FIGURES, Evaluation, Results, Training
@@ -19,26 +19,32 @@ from forestrl.publishing.tables import headline
 
 _START, _END = "<!-- results -->", "<!-- /results -->"
 _WORDS = {
-    "summary": "### In a minute\n",
+    "summary": """### In a minute
+
+± is the larger side of the 95 % bootstrap interval of a mean. Over training seeds for the method:
+with three of them that is about their range. Over arenas for one checkpoint or planner.
+""",
     "reproduction": "### Does it reproduce?\n",
     "headline": """### What beats what
 
 Nominal forest (h = 50, 45 trunks). Coverage, area under the coverage curve and interventions in
-per cent. Steps to 98 %: mean of the runs that got there, whose share stands beside. ± is the larger
-side of the 95 % bootstrap interval of the mean, over what its column says: arenas are resampled for
-one checkpoint or planner, training seeds for the method. **Bold**: best of a column; for steps only
-where 95 % of the runs got there. Planners that never need an intervention do not count in those
-columns, nor does hindsight in any. *Italics*: numbers from elsewhere. The paper's are those of its
-text. Explore-Bench's grid simulator (commit ce3b98a, unchanged) was run in 40 forests of this size
-with a wall around, whose trunks have integer centres and radii. The plain program was written
-without this code and run in 300 other forests; its frontiers and its rule for ties are its own.
+per cent. Steps to 98 %: mean of the runs that got there, whose share stands beside. ± as above,
+over what its column says. **Bold**: best of a column; for steps only where 95 % of the runs got
+there. Planners that never need an intervention do not count in those columns; hindsight and the
+most probable action count in none. *Italics*: numbers from elsewhere. The paper's are its text's.
+Explore-Bench's grid simulator (commit ce3b98a, its planning as it is) was run in 40 forests of this
+size with a wall around; its LiDAR sees a square, its trunks have integer centres and radii, and it
+counts all free cells. The plain program was written without this code and run in 300 other forests;
+its rule for ties is its own.
 """,
     "endings": """### How the runs end
 
 Share of the runs in the nominal forest, in per cent: 98 % of the cells reached, or why not. The
-planners as published keep the faults of Explore-Bench's code and go round in cycles or aim at
-trunks; mended, with path lengths over diagonal moves too and frontiers out of reach left aside,
-none does. The last column is the mean coverage at the end of the runs that did not reach 98 %.
+planners as published keep the faults of Explore-Bench's planning, though not of its LiDAR, and go
+round in cycles or aim at trunks; mended, with path lengths over diagonal moves too and frontiers
+out of reach left aside, none does. Cycles are detected for planners only: the most probable action
+ends in them too. The last column is the mean coverage at the end of the runs that did not reach
+98 %.
 """,
     "differences": """### By how much
 
@@ -47,9 +53,10 @@ side of the 95 % bootstrap interval over arenas. Coverage, area and intervention
 points; steps over the arenas where both got to 98 %, whose number stands beside. **Bold**: the
 interval excludes 0 in favour of the first; *italics*: in favour of the other.
 """,
-    "forests": """### Denser and larger forests
+    "forests": """### Denser and larger forests, and longer episodes
 
-In per cent; ± as above. "Stuck": neither at 98 % nor still exploring.
+In per cent; ± as above, but for coverage at 5000 steps: 1.96 standard errors of the mean. "Stuck":
+planners that can no longer move on; it is not detected for other policies.
 """,
     "ablations": """### What each part is good for
 
@@ -60,10 +67,12 @@ by `forestrl train experiment=ablations hydra.sweep.dir=multirun/results/ablatio
 """What stands above each table, in the order of the README."""
 _APART = "differences"
 """Has a file of its own."""
+_LONG = {"differences", "forests"}
+"""Are folded in the README."""
 
 
 def tables(results: Results, policy: str, ablations: str) -> dict[str, str]:
-    """Writes ``table.md``, ``differences.md`` and ``kernels.md``; what has no data is empty.
+    """Writes ``table.md``, ``differences.md`` and ``learning.md``; what has no data is empty.
 
     Args:
         results: what was read.
@@ -73,7 +82,7 @@ def tables(results: Results, policy: str, ablations: str) -> dict[str, str]:
     found = _tables(results, policy, ablations)
     pairs = found.pop(_APART, "")
     main = "\n".join(found.values())
-    return {"table.md": main, "differences.md": pairs, "kernels.md": kernels(results)}
+    return {"table.md": main, "differences.md": pairs, "learning.md": learning(results)}
 
 
 def _tables(results: Results, policy: str, ablations: str) -> dict[str, str]:
@@ -109,7 +118,8 @@ def text(
         readme: the file, to which the links are relative.
         training: commands of the trainings, by the file of their metrics.
     """
-    parts = list(_tables(results, policy, ablations).values())
+    found = _tables(results, policy, ablations)
+    parts = [_folded(table) if name in _LONG else table for name, table in found.items()]
     drawn = {name: panel for name, panel in panels.items() if isinstance(panel, Panel)}
     if drawn:
         parts.append("### Figures\n")
@@ -124,6 +134,12 @@ def text(
             f"<details><summary>commands</summary>\n\n```bash\n{commands}\n```\n\n</details>\n"
         )
     return "\n".join(parts)
+
+
+def _folded(part: str) -> str:
+    """Folds what stands under a heading."""
+    heading, _, rest = part.partition("\n")
+    return f"{heading}\n\n<details><summary>table</summary>\n{rest}\n</details>\n"
 
 
 def _draw_command(results: Results, policy: str) -> str:

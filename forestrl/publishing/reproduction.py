@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 from forestrl import paper as P
-from forestrl.publishing.results import Method, Results
+from forestrl.publishing.results import Results
 from forestrl.publishing.statistics import Interval
-from forestrl.publishing.tables import LABELS, Column, forest, markdown
+from forestrl.publishing.tables import LABELS, Column, forest, markdown, signed
 
 Kind = Literal["≥", "≤", ""]
 """Whether more is better, less is, or neither."""
@@ -36,22 +36,34 @@ def reproduction(results: Results, policy: str) -> str:
         a Markdown table, empty if nothing was measured.
     """
     rows = []
-    for claim, method, missed in measured(results, policy):
+    for claim, value, unit, holds in findings(results, policy):
         paper = f"{claim.kind} {100 * claim.share:.0f}".strip()
-        here = Column("", claim.measure).cell(method.measure(claim.measure))
-        rows.append([claim.label, paper, here, method.unit, missed or "yes"])
-    head = ["statement of the paper (%)", "paper", "here", "± over", "reached"]
+        rows.append([claim.label, paper, Column("", claim.measure).cell(value), unit, holds])
+    head = ["statement of the paper (%)", "paper", "here", "± over", "holds"]
     return markdown(head, rows) if rows else ""
 
 
-def measured(results: Results, policy: str) -> Iterable[tuple[Claim, Method, str]]:
-    """Gives the statements that were measured, by whom, and why one is not reached, if so."""
+class Finding(NamedTuple):
+    """A statement of the paper, what was measured here and over what, and the verdict."""
+
+    claim: Claim
+    value: Interval
+    unit: str
+    verdict: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the statement holds, be it within the interval."""
+        return not self.verdict.startswith("no")
+
+
+def findings(results: Results, policy: str) -> Iterable[Finding]:
+    """Gives the statements that were measured."""
     for claim in _claims(policy):
         method = results.method(claim.setting, claim.policy)
         value = method.measure(claim.measure) if method else None
         if method and value:
-            reached = verdict(value, claim.share, claim.kind)
-            yield claim, method, "" if reached == "yes" else reached
+            yield Finding(claim, value, method.unit, verdict(value, claim.share, claim.kind))
 
 
 def _claims(policy: str) -> Iterable[Claim]:
@@ -75,7 +87,7 @@ def _claims(policy: str) -> Iterable[Claim]:
 
 
 def verdict(value: Interval, share: float, kind: Kind) -> str:
-    """Tells whether a number of the paper was reached.
+    """Tells whether a number of the paper holds here.
 
     Args:
         value: ours, with its interval.
@@ -87,6 +99,6 @@ def verdict(value: Interval, share: float, kind: Kind) -> str:
     """
     if (kind == "≥" and value.mean >= share) or (kind == "≤" and value.mean <= share):
         return "yes"
-    if value.low <= share <= value.high:
+    if value.low <= share <= value.high or value.mean == share:
         return "within the interval"
-    return f"no: {100 * (value.mean - share):+.1f}".replace("-", "−")
+    return f"no: {signed(100 * (value.mean - share))}"

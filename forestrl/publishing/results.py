@@ -28,6 +28,7 @@ TRAINING, REFERENCE, FIGURES, ABLATIONS = "training", "training_pyg", "figures",
 
 _EPISODES = ("index", "coverage", "intervention_rate", "steps_to_98")
 _CURVE = ("step", "mean", "low", "high")
+_MOVING = {"covered", "budget"}  # endings of runs that are not stuck
 _SEED = re.compile(r"(?P<name>.+)_seed(?P<seed>\d+)")
 
 
@@ -191,15 +192,10 @@ def measure(summary: dict[str, Any], name: str) -> Interval | None:
         return None if entry is None else Interval(entry["reached"])
     if name == "stuck":
         ways = summary.get("endings")
-        return None if ways is None else Interval(sum(ways.values()) - _moving(ways))
+        return None if ways is None else Interval(sum(ways[way] for way in ways.keys() - _MOVING))
     if name == "intervention_rate":
         return _interval(summary["interventions"]["rate"])
     return Interval((summary if name == "collisions" else summary["interventions"])[name])
-
-
-def _moving(endings: dict[str, float]) -> float:
-    """The share of the runs that covered the forest or were still exploring it."""
-    return endings.get("covered", 0.0) + endings.get("budget", 0.0)
 
 
 def _read_trainings(folder: Path) -> dict[int, Training]:

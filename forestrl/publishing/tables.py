@@ -24,7 +24,9 @@ LABELS = {
 }
 """Known policies, in the order of the tables."""
 
-_PRIVILEGED = "hindsight"
+PRIVILEGED = "hindsight"
+_NOT_RANKED = {PRIVILEGED, "learned_mode"}
+_OF_FILTER = {"intervention_rate", "percentile_80"}
 _MOST = 0.95  # of the runs must get there before their steps to 98 % count as best
 
 
@@ -48,6 +50,12 @@ class Column(NamedTuple):
             text += f" ± {self.factor * interval.margin:.{self.digits}f}"
         return text
 
+    def given(self, interval: Interval | None) -> str:
+        """Writes a number with no more digits than its source has."""
+        if interval is None or not math.isnan(interval.margin):
+            return self.cell(interval)
+        return f"{round(self.factor * interval.mean, self.digits):g}"
+
 
 COLUMNS = (
     *(Column(f"coverage at {step}", f"coverage_{step}") for step in (250, 500, 1000, 2000, 2500)),
@@ -66,6 +74,13 @@ class Row(NamedTuple):
     unit: str
     values: Mapping[str, Interval | None]
     competes: bool = True
+    given: bool = False
+    """Whether its digits are those of another source."""
+
+
+def signed(number: float, digits: int = 1) -> str:
+    """Writes a number with its sign."""
+    return f"{number:+.{digits}f}".replace("-", "−")
 
 
 def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -99,14 +114,14 @@ def _headline_rows(methods: dict[str, Method]) -> Iterable[Row]:
     for name in ordered(LABELS.keys() | methods.keys()):
         label = LABELS.get(name, f"`{name}`")
         if name in methods:
-            method, competes = methods[name], name != _PRIVILEGED
+            method, competes = methods[name], name not in _NOT_RANKED
             yield _row(label, method, competes)
             if len(method.seeds) > 1:
                 seed = min(method.seeds)
                 checkpoint = Method(name, {seed: method.first})
                 yield _row(f"{label}: seed {seed}", checkpoint, competes)
         for other in BESIDE.get(name, ()):
-            yield Row(f"*{other.label}*", other.unit, other.values, competes=False)
+            yield Row(f"*{other.label}*", other.unit, other.values, competes=False, given=True)
 
 
 def _row(label: str, method: Method, competes: bool) -> Row:
@@ -122,7 +137,9 @@ def _best(column: Column, rows: list[Row]) -> str:
         if value is None or not row.competes:
             continue
         late = column.measure == "steps_to_98" and (reached is None or reached.mean < _MOST)
-        if not late and not (column.best is min and value.mean == 0):
+        needs = row.values.get("intervention_rate")
+        never = column.measure in _OF_FILTER and (needs is None or needs.mean == 0)
+        if not late and not never:
             values.append(value.mean)
     return column.cell(Interval(column.best(values))) if values else ""
 
@@ -130,7 +147,7 @@ def _best(column: Column, rows: list[Row]) -> str:
 def _marked(column: Column, row: Row, best: str) -> str:
     """A cell, bold if it is the best, with the share of runs that got to 98 %."""
     value, reached = row.values.get(column.measure), row.values.get("reached_98")
-    text = column.cell(value)
+    text = column.given(value) if row.given else column.cell(value)
     late = column.measure == "steps_to_98" and (reached is None or reached.mean < _MOST)
     if row.competes and not late and text.partition(" ")[0] == best:
         text = f"**{text}**"

@@ -4,8 +4,8 @@ import pytest
 
 from forestrl.publishing.comparisons import differences, forests
 from forestrl.publishing.endings import endings
-from forestrl.publishing.kernels import kernels
-from forestrl.publishing.reproduction import reproduction, verdict
+from forestrl.publishing.learning import learning
+from forestrl.publishing.reproduction import findings, reproduction, verdict
 from forestrl.publishing.results import read_results
 from forestrl.publishing.statistics import Interval
 from forestrl.publishing.summary import last_step_ahead, summary
@@ -48,8 +48,8 @@ def test_headline_sets_the_paper_beside_ours_and_marks_the_best(tmp_path):
     table = headline(read_results(tmp_path))
     ours, theirs = cells(table, "GATv2 and PPO"), cells(table, "*paper: GATv2 and PPO*")
     assert ours["± over"] == "2 arenas" and ours["coverage at 2500"] == "85.0 ± 1.0"
-    assert theirs["coverage at 2500"] == "97.0"
-    assert theirs["coverage at 250"] == "–" and theirs["their 80th percentile"] == "15.0"
+    assert theirs["coverage at 2500"] == "97"
+    assert theirs["coverage at 250"] == "–" and theirs["their 80th percentile"] == "15"
     best = cells(table, "nearest frontier")
     assert best["coverage at 2500"] == "**99.0 ± 1.0**"
     assert best["interventions"] == "0"
@@ -79,6 +79,7 @@ def test_a_method_of_several_seeds_has_a_row_over_seeds_and_one_of_its_checkpoin
         (Interval(0.12, 0.11, 0.13), 0.10, "≤", "no: +2.0"),
         (Interval(0.90, 0.89, 0.91), 0.88, "", "no: +2.0"),
         (Interval(0.88), 0.90, "≥", "no: −2.0"),
+        (Interval(0.88), 0.88, "", "within the interval"),
     ],
 )
 def test_verdicts(value, share, kind, text):
@@ -94,9 +95,9 @@ def test_reproduction_lists_what_was_measured_only(tmp_path):
         "paper": "≥ 80",
         "here": "85.0 ± 1.0",
         "± over": "2 arenas",
-        "reached": "yes",
+        "holds": "yes",
     }
-    assert cells(table, "75 trunks: interventions, mean")["reached"] == "no: +10.0"
+    assert cells(table, "75 trunks: interventions, mean")["holds"] == "no: +10.0"
     assert "h = 75" not in table and "MMPF" not in table
 
 
@@ -139,7 +140,7 @@ def test_endings_say_who_is_stuck_and_why(tmp_path):
         "policy": "GATv2 and PPO",
         "runs": "4",
         "reached 98 %": "75.0",
-        "still exploring": "25.0",
+        "steps used up": "25.0",
         "in a cycle": "0",
         "goal is its own cell": "0",
         "sees no goal in reach": "0",
@@ -155,12 +156,27 @@ def test_the_summary_names_wins_and_losses(tmp_path):
     write_evaluation(tmp_path, coverage=(0.99, 0.97), rate=0.3, endings={})
     write_evaluation(tmp_path, name="random", coverage=(0.5, 0.05), rate=0.0)
     write_evaluation(tmp_path, name="nearest_frontier", coverage=(1.0, 0.98), rate=0.0)
-    reproduced, ahead, behind, speed = summary(read_results(tmp_path), "learned").splitlines()
-    assert "4 of the 5 statements" in reproduced
-    assert reproduced.endswith("Not reached: interventions, mean (paper 10 %).")
-    assert ahead.endswith("in percentage points: random walk (+70.5 ± 21.5).")
-    assert behind.endswith("in percentage points: nearest frontier (−1.0 ± 0.0).")
-    assert "nearest frontier reaches 98 % in every run, after 400 ± 10 steps" in speed
+    write_evaluation(tmp_path, name="cost_published", coverage=(0.9, 0.86), rate=0.0)
+    write_evaluation(tmp_path, name="mmpf_published", coverage=(0.9, 0.9), rate=0.0)
+    write_training(tmp_path / "training" / "seed0.csv", evaluated=(0.9, 0.8))
+    lines = summary(read_results(tmp_path), "learned").splitlines()
+    reproduced, conditions, beats, beaten, steps = lines
+    assert "the paper's 5 numbers about its policy, 4 are reached or passed" in reproduced
+    assert "interventions, mean 30.0 ± 1.0 % (paper 10). Its benchmarks" in reproduced
+    assert "MMPF, as published: coverage at 2500 steps 90.0 ± 1.0 % (paper 78)" in reproduced
+    assert "The last checkpoints cover 80.0 % there" in conditions
+    assert "on the same 2 arenas" in beats and "random walk +70.5 ± 21.5." in beats
+    assert beaten.endswith("in percentage points: nearest frontier −1.0 ± 0.0.")
+    assert "GATv2 and PPO 400 ± 10 in 100 % of the runs; cost-based" in steps
+    assert "random walk" not in steps  # half of its runs got there
+
+
+def test_a_benchmark_that_ends_where_the_papers_does_holds(tmp_path):
+    write_evaluation(tmp_path, name="cost_published", coverage=(0.88, 0.88))
+    write_evaluation(tmp_path, name="mmpf_published", coverage=(0.90, 0.90))
+    cost, mmpf = findings(read_results(tmp_path), "learned")
+    assert cost.holds and cost.verdict == "within the interval"
+    assert not mmpf.holds and mmpf.verdict == "no: +12.0"
 
 
 @pytest.mark.parametrize(
@@ -174,7 +190,7 @@ def test_the_last_step_ahead(tmp_path, theirs, step):
         (folder / "curve.csv").write_text("\n".join(["step,mean,low,high", *rows]) + "\n")
     methods = read_results(tmp_path).settings["nominal"]
     assert last_step_ahead(methods["learned"].first, methods["random"].first) == step
-    found = f"random walk (to step {step})" in summary(read_results(tmp_path), "learned")
+    found = f"of random walk to step {step}." in summary(read_results(tmp_path), "learned")
     assert found == (step is not None)
 
 
@@ -185,11 +201,11 @@ def test_without_the_learned_policy_there_is_no_summary(tmp_path):
 
 def test_trainings_of_both_networks_are_set_side_by_side(tmp_path):
     def write(group, seed, first, second):
-        write_training(tmp_path / group / f"seed{seed}.csv", [first] * 12 + [second] * 12)
+        write_training(tmp_path / group / f"seed{seed}.csv", [first] * 12 + [second] * 14)
 
     write("training", 0, 10, 50), write("training", 1, 30, 70)
     write("training_pyg", 0, 20, 80), write("training_pyg", 1, 40, 90)
-    rows = [line.strip("| ").split(" | ") for line in kernels(read_results(tmp_path)).splitlines()]
+    rows = [line.strip("| ").split(" | ") for line in learning(read_results(tmp_path)).splitlines()]
     returns = ["rollout/return", "0 to 12,800", "20 (10 to 30)", "30 (20 to 40)", "yes"]
     assert rows[2] == returns  # updates at 1000, 2000, ... frames
     assert rows[3][1:] == ["12,800 to 25,600", "60 (50 to 70)", "85 (80 to 90)", "no"]
@@ -198,4 +214,4 @@ def test_trainings_of_both_networks_are_set_side_by_side(tmp_path):
 
 def test_without_trainings_of_both_networks_there_is_no_comparison(tmp_path):
     write_training(tmp_path / "training" / "seed0.csv")
-    assert kernels(read_results(tmp_path)) == ""
+    assert learning(read_results(tmp_path)) == ""

@@ -15,8 +15,8 @@ _MEASURES = {"rollout/return": (1.0, 0), "rollout/coverage": (100.0, 1)}
 """Columns of metrics.csv, with the factor and the digits they are shown with."""
 
 
-def kernels(results: Results) -> str:
-    """Sets the trainings of both networks side by side, window by window.
+def learning(results: Results) -> str:
+    """Sets the trainings of both networks side by side, in every whole window of frames.
 
     Returns:
         a Markdown table: mean over seeds and, in brackets, the least and the most; empty if there
@@ -28,7 +28,7 @@ def kernels(results: Results) -> str:
     ends = [training.metrics["frames"].max() for training in (*ours, *theirs)]
     rows = []
     for name, (factor, digits) in _MEASURES.items():
-        for first in range(0, int(min(ends)), _WINDOW):
+        for first in range(0, int(min(ends)) - _WINDOW + 1, _WINDOW):
             fused, pyg = (_means(group, name, first) for group in (ours, theirs))
             meet = max(min(fused), min(pyg)) <= min(max(fused), max(pyg))
             cells = [_cell([factor * x for x in each], digits) for each in (fused, pyg)]
