@@ -29,6 +29,7 @@ ABLATIONS = {  # what each changes
     "no_filter": {"safety._target_": None},
     "no_potential": {"reward.shaping": False},
     "no_edge_lengths": {"model.edge_lengths": False},
+    "no_entropy": {"algo.entropy_coeff": 0.0},
     "beta_0.0": {"reward.beta": 0.0},
     "beta_0.25": {"reward.beta": 0.25},
     "beta_1.0": {"reward.beta": 1.0},

@@ -60,13 +60,14 @@ def _beside(finding: Finding) -> str:
 def _last_checkpoints(trainings: list[Training]) -> str:
     """What the policies were at the end of their trainings."""
     each = [training.metrics.get("eval/coverage", np.array([])) for training in trainings]
-    last = [values[~np.isnan(values)][-1:] for values in each]
-    if not last or any(len(values) == 0 for values in last):
+    curves = [values[~np.isnan(values)] for values in each]
+    if not curves or any(len(values) == 0 for values in curves):
         return ""
-    ends = _listed(f"{100 * float(values[0]):.1f}" for values in last)
+    ends = _listed(f"{100 * float(values[-1]):.1f}" for values in curves)
+    count = min(len(values) for values in curves)
     return (
         "**Under which conditions?** Trained with an entropy bonus, of which the paper says "
-        "nothing; each seed's policy is the best of ten checkpoints, by its coverage curve in 40 "
+        f"nothing; each seed's policy is the best of {count} checkpoints, by the coverage curve in "
         f"other arenas. The last checkpoints cover {ends} % there."
     )
 

@@ -164,6 +164,7 @@ def test_the_summary_names_wins_and_losses(tmp_path):
     assert "the paper's 5 numbers about its policy, 4 are reached or passed" in reproduced
     assert "interventions, mean 30.0 ± 1.0 % (paper 10). Its benchmarks" in reproduced
     assert "MMPF, as published: coverage at 2500 steps 90.0 ± 1.0 % (paper 78)" in reproduced
+    assert "best of 2 checkpoints" in conditions
     assert "The last checkpoints cover 80.0 % there" in conditions
     assert "on the same 2 arenas" in beats and "random walk +70.5 ± 21.5." in beats
     assert beaten.endswith("in percentage points: nearest frontier −1.0 ± 0.0.")
