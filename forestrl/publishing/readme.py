@@ -60,8 +60,8 @@ planners that can no longer move on; it is not detected for other policies.
 """,
     "ablations": """### What each part is good for
 
-Short trainings with a part left out or another beta, each measured at its end on 100 arenas, made
-by `forestrl train experiment=ablations hydra.sweep.dir=multirun/results/ablations`.
+Short trainings with a part left out or another β, each measured at its end on 100 arenas, made by
+`forestrl train experiment=ablations hydra.sweep.dir=multirun/results/ablations`.
 """,
 }
 """What stands above each table, in the order of the README."""
