@@ -35,8 +35,9 @@ def prepare(cfg: DictConfig) -> None:
     require_positive(cfg, "threads")
     if cfg.seed < 0:
         raise ConfigError(f"seed={cfg.seed} is not allowed: it must be 0 or more")
-    torch.set_num_threads(cfg.threads)
+    # Numba first: when it starts its threads, it also sets the number that torch uses.
     numba.set_num_threads(min(cfg.threads, numba.config.NUMBA_NUM_THREADS))
+    torch.set_num_threads(cfg.threads)
     if not are_compiled():
         print("compiling for this machine: half a minute, the first time only", file=sys.stderr)
     try:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -215,3 +216,21 @@ def test_metrics_can_be_read_by_any_program(run):
         table = list(csv.reader(file))
     assert {len(row) for row in table} == {len(table[0])}
     assert all(value == "" or float(value) is not None for row in table[1:] for value in row)
+
+
+THREADS = """
+import numba, torch
+from forestrl import build
+from tests.commands import compose
+build.prepare(compose("train", "env=tiny"))
+env = build.make_training_env(compose("train", "env=tiny"))
+env.rollout(3)
+assert (torch.get_num_threads(), numba.get_num_threads()) == (1, 1), torch.get_num_threads()
+"""
+
+
+def test_threads_are_those_of_the_configuration_in_a_new_process():
+    names = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "MKL_NUM_THREADS")
+    inherited = {name: value for name, value in os.environ.items() if name not in names}
+    run = [sys.executable, "-c", THREADS]
+    subprocess.run(run, env=inherited, check=True, cwd=Path(__file__).parents[1])
