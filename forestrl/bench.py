@@ -18,7 +18,7 @@ from forestrl import build
 from forestrl.benchmark.compiled import measure_compiled, write_compiled
 from forestrl.benchmark.machine import describe_machine
 from forestrl.benchmark.report import write_report
-from forestrl.benchmark.run import Makers, run
+from forestrl.benchmark.run import Makers, explore_all, run
 from forestrl.benchmark.scaling import measure_scaling, write_scaling
 from forestrl.benchmark.stages import Parts
 from forestrl.command import asked_for, command
@@ -105,9 +105,10 @@ def measure(cfg: DictConfig, folder: Path) -> list[str]:
             bar.set_description(done)
             bar.update()
 
-        rows = run(makers, sizes, num_envs, settings.seconds, progress)
+        explored = explore_all(makers, sizes)
+        rows = run(makers, explored, num_envs, settings.seconds, progress)
         texts = [write_report(rows, about, folder)]
-        gains = measure_compiled(makers, sizes, settings.seconds, progress)
+        gains = measure_compiled(makers, explored, settings.seconds, progress)
         texts.append(write_compiled(gains, folder))
         if settings.scaling:
             costs = measure_scaling(makers, *more, settings.seconds, progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ from tensordict import TensorDict
 from forestrl import functional as F
 from forestrl import kernels
 from forestrl.benchmark.report import to_csv
-from forestrl.benchmark.run import Makers, explore_all
+from forestrl.benchmark.run import Forests, Makers
 from forestrl.benchmark.timing import measure
 from forestrl.policies.gatv2 import GATv2Encoder
 from forestrl.storage import atomic_write
@@ -50,18 +50,21 @@ class Gain:
 
 
 def measure_compiled(
-    makers: Makers, sizes: Sequence[int], seconds: float, progress: Callable[[str], object]
+    makers: Makers,
+    explored: Mapping[int, Forests],
+    seconds: float,
+    progress: Callable[[str], object],
 ) -> list[Gain]:
     """Times every function of :mod:`forestrl.kernels` and the encoder, and their references.
 
     Args:
         makers: builds what is measured.
-        sizes: arena sides, cells.
+        explored: arenas by their side, from :func:`forestrl.benchmark.run.explore_all`.
         seconds: budget for each version of each function.
         progress: told what was measured.
     """
     gains = []
-    for size, forests in explore_all(makers, sizes).items():
+    for size, forests in explored.items():
         forest, worlds = makers.forest(size, 1), forests.worlds
         observe = partial(
             _call,

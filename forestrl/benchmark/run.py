@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tensordict import TensorDict
@@ -76,7 +76,7 @@ def explore_all(makers: Makers, sizes: Sequence[int]) -> dict[int, Forests]:
 
 def run(
     makers: Makers,
-    sizes: Sequence[int],
+    explored: Mapping[int, Forests],
     num_envs: Sequence[int],
     seconds: float,
     progress: Callable[[str], object],
@@ -85,7 +85,7 @@ def run(
 
     Args:
         makers: builds what is measured.
-        sizes: arena sides, cells.
+        explored: arenas by their side, from :func:`explore_all`.
         num_envs: numbers of arenas stepped at once.
         seconds: budget for each stage of each cell.
         progress: told what was measured.
@@ -93,9 +93,8 @@ def run(
     Returns:
         all rows, by size and number of arenas.
     """
-    explored = explore_all(makers, sizes)
     rows = []
-    for size, arenas in by_work(sizes, num_envs):
+    for size, arenas in by_work(list(explored), num_envs):
         known = explored[size]
         parts = makers.parts(size, arenas, known.max_frontiers)
         blank = replace(known.blank, num_envs=arenas)
@@ -103,8 +102,7 @@ def run(
         del parts
         gc.collect()
         progress(f"{arenas} of {size} x {size}")
-    for size in sizes:
-        known = explored[size]
+    for size, known in explored.items():
         parts = makers.parts(size, 1, known.max_frontiers)
         rows += measure_decision(parts, arrange(known.worlds, 1), known.blank, seconds)
         progress(f"decisions in {size} x {size}")
