@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numba
 import torch
 from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
@@ -20,8 +19,8 @@ from torchrl.envs import Compose, EnvBase, RewardSum, TransformedEnv
 from forestrl.envs import StaggeredEpisodes
 from forestrl.kernels.sensing import are_compiled
 from forestrl.loggers import CsvLogger, Logger, Loggers, NoLogger, TensorboardLogger, WandbLogger
-from forestrl.policies.learned import ActorCritic
-from forestrl.policies.released import RELEASED, Policy, find_policy, load_policy, require_same
+from forestrl.policies.actor_critic import ActorCritic
+from forestrl.policies.files import RELEASED, Policy, find_policy, load_policy, require_same
 
 _ARCHITECTURE = ("hidden", "heads", "critic_readout", "lidar_range", "edge_lengths")
 
@@ -35,8 +34,6 @@ def prepare(cfg: DictConfig) -> None:
     require_positive(cfg, "threads")
     if cfg.seed < 0:
         raise ConfigError(f"seed={cfg.seed} is not allowed: it must be 0 or more")
-    # Numba first: when it starts its threads, it also sets the number that torch uses.
-    numba.set_num_threads(min(cfg.threads, numba.config.NUMBA_NUM_THREADS))
     torch.set_num_threads(cfg.threads)
     if not are_compiled():
         print("compiling for this machine: half a minute, the first time only", file=sys.stderr)

@@ -19,7 +19,7 @@ from forestrl import build
 from forestrl.command import asked_for, command
 from forestrl.envs import ExplorationGraph, ForestEnv, SafetyFilter
 from forestrl.evaluation.episodes import evaluate
-from forestrl.policies.classical import RandomWalk
+from forestrl.planners import RandomWalk
 from forestrl.storage import atomic_write
 
 _COLUMNS = ("policy", "filter", "size", "n_trees", "steps", "interventions", "collisions")

@@ -22,7 +22,7 @@ room for frontier nodes.
 | ``("graph", "frontiers")`` | number of frontier cells | ``[*B, 1]`` int64 | ExplorationGraph |
 | ``("exploration", "potential")`` | Phi(s_t) | ``[*B, 1]`` float32 | FrontierPotentialReward |
 | ``"action"`` | u^pi at the root | ``[*B]`` int64, 0 to 8 | policy |
-| ``("planner", "reason")`` | - | ``[*B]`` int8, why a planner stays | classical planners |
+| ``("planner", "status")`` | - | ``[*B]`` int8, ``Status`` | classical planners |
 | ``"uniform"`` | - | ``[*B]`` float32, one draw an arena to sample with | evaluation |
 
 ``"reward"`` is n^e_t from ForestEnv and r_t (Eq. 6) after FrontierPotentialReward; ``"done"``,
@@ -55,4 +55,4 @@ STEP_COUNT = "step_count"
 ACTION = "action"
 LOGITS = "logits"
 UNIFORM = "uniform"
-REASON = ("planner", "reason")
+STATUS = ("planner", "status")

@@ -25,7 +25,7 @@ from forestrl.learning.checkpoint import (
     training_state,
 )
 from forestrl.learning.metrics import summarize
-from forestrl.policies.released import POLICY_FILE, save_policy
+from forestrl.policies.files import POLICY_FILE, save_policy
 from forestrl.progress import Progress
 
 

@@ -10,8 +10,8 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
 
 L0 = {"functional", "kernels"}
-L1 = {"keys", "paper", "storage", "progress"}
-L2 = {"envs", "policies", "learning"}
+L1 = {"keys", "paper", "status", "storage", "progress"}
+L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "benchmark"}
 L3 = {"config", "command", "loggers", "build"}
 L4 = {"train", "eval", "render", "collisions", "bench", "figures"}
@@ -35,9 +35,11 @@ ROOMS = {  # room: the other rooms it may import from
 LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "": set(),
     "functional": {"torch"},
-    "kernels": {"torch", "numba", "llvmlite", "numpy"},
+    "kernels": {"torch", "numba", "numpy"},
+    "planners": {"torch", "tensordict", "numba", "numpy"},
     "keys": {"torch", "tensordict"},
     "paper": set(),
+    "status": set(),
     "storage": set(),
     "publishing": {"numpy", "scipy", "matplotlib"},
     "progress": {"tqdm"},

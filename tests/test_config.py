@@ -11,7 +11,7 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 from forestrl.cli import COMMANDS
 from forestrl.config import CONF_DIR
 from forestrl.loggers import NoLogger
-from forestrl.policies.learned import ActorCritic
+from forestrl.policies.actor_critic import ActorCritic
 from forestrl.progress import Progress
 from forestrl.train import Training
 from tests.commands import compose

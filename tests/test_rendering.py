@@ -8,11 +8,11 @@ from tensordict import TensorDict
 
 from forestrl import keys as K
 from forestrl.evaluation import arenas, uniforms
-from forestrl.kernels.planning import Reason
 from forestrl.rendering import draw_frame, record_episode, write_gif
 from forestrl.rendering import panel as P
 from forestrl.rendering.frame import _GAP, _HEAD
 from forestrl.rendering.scene import Scene
+from forestrl.status import Status
 from tests.drawing import situation
 from tests.evaluation.policies import forest, random_action, random_logits
 
@@ -96,14 +96,14 @@ def test_graph_edges_are_drawn_when_there_is_a_graph():
     assert edge_pixels(bare) == 0 and edge_pixels(graph) > 100
 
 
-@pytest.mark.parametrize(("reason", "more"), [(Reason.EXPLORING, False), (Reason.CYCLE, True)])
-def test_the_caption_says_why_a_planner_stopped(reason, more):
+@pytest.mark.parametrize(("status", "more"), [(Status.EXPLORING, False), (Status.CYCLE, True)])
+def test_the_caption_says_why_a_planner_stopped(status, more):
     def ink(td):
         frame = draw_frame(td, scale=2 * SCALE)
         caption = np.asarray(frame)[_HEAD + 2 * SIDE * SCALE + 4 :, : 2 * (_GAP + 2 * SIDE * SCALE)]
         return (caption == P.INK).all(-1).sum()
 
-    planned = state().set(K.REASON, torch.tensor(reason, dtype=torch.int8))
+    planned = state().set(K.STATUS, torch.tensor(status, dtype=torch.int8))
     assert Scene(planned).stopped == ("cycle" if more else "")
     assert (ink(planned) > ink(state())) == more
 

@@ -9,7 +9,6 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-import numba
 import torch
 
 _LIBRARIES = ("torch", "torchrl", "tensordict", "torch-geometric", "numba")
@@ -20,7 +19,7 @@ def describe_machine() -> dict[str, str]:
     return {
         "processor": _processor(),
         "cores": str(os.cpu_count()),
-        "threads": f"torch {torch.get_num_threads()}, numba {numba.get_num_threads()}",
+        "threads": str(torch.get_num_threads()),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         **{name: version(name) for name in _LIBRARIES},

@@ -37,7 +37,7 @@ from forestrl import keys as K
 from forestrl.benchmark.states import enter
 from forestrl.envs import ExplorationGraph
 from forestrl.learning.ppo import PPO
-from forestrl.policies.learned import ActorCritic
+from forestrl.policies.actor_critic import ActorCritic
 
 T = TypeVar("T")
 Call = Callable[[], object]

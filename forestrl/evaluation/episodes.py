@@ -16,7 +16,7 @@ from torchrl.envs import EnvBase
 from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.evaluation.arenas import draw_arenas, uniforms
-from forestrl.evaluation.endings import end_reason
+from forestrl.evaluation.endings import ending
 
 _NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
@@ -50,7 +50,7 @@ class Episodes:
     truncated_graphs: NDArray[np.int32]
     """Observations with more frontier cells than the graph has room for, ``[n]``."""
     ending: NDArray[np.int8]
-    """Why the episode ended, a ``Reason``, ``[n]``: COVERED where the coverage goal was reached."""
+    """Why the episode ended, an ``Ending``, ``[n]``."""
 
     def __len__(self) -> int:
         return len(self.index)
@@ -230,7 +230,7 @@ class _Record:
     def episodes(self, index: NDArray[np.int64], last: TensorDictBase, goal: float) -> Episodes:
         """Gives the record as arrays; ``last`` is the state after the last step."""
         exploring = torch.zeros_like(self.counts["collisions"], dtype=torch.int8)
-        reason = last.get(K.REASON, exploring)
+        status = last.get(K.STATUS, exploring)
         free = ~last[K.TREES]
         known = (free & (last[K.CELLS] == F.Cell.FREE)).sum((-2, -1))
         length = self.counts["straight"] + 2**0.5 * self.counts["diagonal"]
@@ -243,7 +243,7 @@ class _Record:
             free_share=_array(known / free.sum((-2, -1))),
             null_actions=_array(self.counts["null_actions"]),
             truncated_graphs=_array(self.counts["truncated"]),
-            ending=_array(end_reason(reason, (self.coverage >= goal).any(0))),
+            ending=_array(ending(status, (self.coverage >= goal).any(0))),
         )
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from forestrl.evaluation.endings import Ending
 from forestrl.evaluation.episodes import Episodes
 from forestrl.evaluation.plots import coverage_png, interventions_png
-from forestrl.kernels.planning import Reason
 from forestrl.paper import INTERVENTION_LIMIT
 from forestrl.storage import atomic_write
 
@@ -97,7 +97,7 @@ def summarize(episodes: Episodes) -> dict[str, Any]:
         "path_length": _mean(episodes.path_length),
         "truncated_graphs": int(episodes.truncated_graphs.sum()),
         "endings": {
-            Reason(ending).name.lower(): float((episodes.ending == ending).mean())
+            Ending(ending).name.lower(): float((episodes.ending == ending).mean())
             for ending in np.unique(episodes.ending)
         },
     }
@@ -143,7 +143,7 @@ def _episode_rows(episodes: Episodes) -> Iterable[Sequence[Any]]:
         "null_actions": episodes.null_actions,
         "collisions": episodes.collisions,
         "path_length": episodes.path_length,
-        "ending": [Reason(ending).name.lower() for ending in episodes.ending],
+        "ending": [Ending(ending).name.lower() for ending in episodes.ending],
     }
     return [tuple(columns), *zip(*columns.values(), strict=True)]
 

@@ -7,35 +7,16 @@ import from here and get the fastest version for the tensors they pass.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
-from typing import TypeVar
-
-from torch import Tensor
-
 from forestrl import functional as F
 from forestrl.kernels import graph, paths, sensing
+from forestrl.kernels.dispatch import by_device
 
-R = TypeVar("R")
-
-
-def _compiled(compiled: Callable[..., R], reference: Callable[..., R]) -> Callable[..., R]:
-    """Takes the compiled version for CPU tensors and the reference for all others."""
-
-    @wraps(reference)
-    def choose(first: Tensor, *args: object, **kwargs: object) -> R:
-        version = compiled if first.device.type == "cpu" else reference
-        return version(first, *args, **kwargs)
-
-    return choose
-
-
-exploration_graph = _compiled(graph.exploration_graph, F.exploration_graph)
-potential = _compiled(graph.potential, F.potential)
-sense = _compiled(sensing.sense, F.sense)
-component = _compiled(paths.component, F.component)
-largest_component = _compiled(paths.largest_component, F.largest_component)
-path_lengths = _compiled(paths.path_lengths, F.path_lengths)
+exploration_graph = by_device(graph.exploration_graph, F.exploration_graph)
+potential = by_device(graph.potential, F.potential)
+sense = by_device(sensing.sense, F.sense)
+component = by_device(paths.component, F.component)
+largest_component = by_device(paths.largest_component, F.largest_component)
+path_lengths = by_device(paths.path_lengths, F.path_lengths)
 
 __all__ = [
     "component",

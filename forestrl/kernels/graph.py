@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numba import njit, prange
+from numba import njit
 from torch import Tensor
 
 from forestrl.functional import DISPLACEMENTS, FEATURES, WAYPOINTS, Cell, Graph
+from forestrl.kernels.batches import grids, over_batch, rows
 
 _DISPLACEMENTS = DISPLACEMENTS.numpy()
 _UNKNOWN, _FREE = int(Cell.UNKNOWN), int(Cell.FREE)
@@ -89,8 +90,10 @@ def _write_counts(
     x[7] = np.float32(border) / area
 
 
-@njit(cache=True, parallel=True)
+@over_batch
 def _graphs(
+    first: int,
+    last: int,
     cells: np.ndarray,
     position: np.ndarray,
     window: int,
@@ -101,7 +104,7 @@ def _graphs(
     frontiers: np.ndarray,
 ) -> None:
     height, width = cells.shape[1:]
-    for b in prange(len(cells)):
+    for b in range(first, last):
         row, col = position[b]
         frontier = np.empty((height, width), np.uint8)
         count = _mark_frontier(cells[b], frontier)
@@ -128,14 +131,14 @@ def exploration_graph(
 ) -> Graph:
     """:func:`forestrl.functional.exploration_graph`, compiled."""
     batch = cells.shape[:-2]
-    rows = batch.numel()
-    x = torch.zeros(rows, WAYPOINTS + max_frontiers, FEATURES)
-    waypoint = torch.zeros(rows, max_frontiers, dtype=torch.int64)
-    length = torch.zeros(rows, max_frontiers)
-    frontiers = torch.empty(rows, dtype=torch.int64)
+    count = batch.numel()
+    x = torch.zeros(count, WAYPOINTS + max_frontiers, FEATURES)
+    waypoint = torch.zeros(count, max_frontiers, dtype=torch.int64)
+    length = torch.zeros(count, max_frontiers)
+    frontiers = torch.empty(count, dtype=torch.int64)
     _graphs(
-        _grids(cells),
-        _rows(position),
+        grids(cells),
+        rows(position),
         window,
         float(lidar_range),
         x.numpy(),
@@ -151,14 +154,20 @@ def exploration_graph(
     )
 
 
-@njit(cache=True, parallel=True)
+@over_batch
 def _potentials(
-    cells: np.ndarray, position: np.ndarray, window: int, beta: float, out: np.ndarray
+    first: int,
+    last: int,
+    cells: np.ndarray,
+    position: np.ndarray,
+    window: int,
+    beta: float,
+    out: np.ndarray,
 ) -> None:
     height, width = cells.shape[1:]
     diagonal = np.sqrt((height - 1.0) ** 2 + (width - 1.0) ** 2)
     area = window * window
-    for b in prange(len(cells)):
+    for b in range(first, last):
         row, col = position[b]
         frontier = np.empty((height, width), np.uint8)
         _mark_frontier(cells[b], frontier)
@@ -175,13 +184,5 @@ def _potentials(
 def potential(cells: Tensor, position: Tensor, *, window: int, beta: float) -> Tensor:
     """:func:`forestrl.functional.potential`, compiled."""
     out = torch.empty(cells.shape[:-2].numel())
-    _potentials(_grids(cells), _rows(position), window, float(beta), out.numpy())
+    _potentials(grids(cells), rows(position), window, float(beta), out.numpy())
     return out.view(*cells.shape[:-2], 1)
-
-
-def _grids(grid: Tensor) -> np.ndarray:
-    return grid.detach().reshape(-1, *grid.shape[-2:]).contiguous().numpy()
-
-
-def _rows(position: Tensor) -> np.ndarray:
-    return position.detach().reshape(-1, 2).contiguous().numpy()

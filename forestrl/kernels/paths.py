@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numba import njit, prange
 from torch import Tensor
 
 from forestrl.functional import gather
+from forestrl.kernels.batches import over_batch, rows
 from forestrl.kernels.flood import PAD, UNREACHED, eight_steps, flood, no_lengths, pad, walk
 
 
-@njit(cache=True, parallel=True)
-def _path_lengths(cells: np.ndarray, source: np.ndarray, out: np.ndarray) -> None:
+@over_batch
+def _path_lengths(
+    first: int, last: int, cells: np.ndarray, source: np.ndarray, out: np.ndarray
+) -> None:
     stride = cells.shape[2] + 2 * PAD
-    for b in prange(len(cells)):
+    for b in range(first, last):
         start = (source[b, 0] + PAD) * stride + source[b, 1] + PAD
         lengths, queue, reached = walk(pad(cells[b]), eight_steps(stride), start)
         for i in range(reached):
             out[b, queue[i] // stride - PAD, queue[i] % stride - PAD] = lengths[queue[i]]
 
 
-@njit(cache=True, parallel=True)
-def _largest_components(cells: np.ndarray, out: np.ndarray) -> None:
+@over_batch
+def _largest_components(first: int, last: int, cells: np.ndarray, out: np.ndarray) -> None:
     stride = cells.shape[2] + 2 * PAD
-    for b in prange(len(cells)):
+    for b in range(first, last):
         grid, steps = pad(cells[b]), eight_steps(stride)
         lengths, queue = no_lengths(grid), np.empty(len(grid), np.int32)
         best_size, best_last, best_cell = 0, 0, -1
@@ -46,7 +48,7 @@ def path_lengths(free: Tensor, source: Tensor) -> Tensor:
     grids = free.reshape(-1, *free.shape[-2:]).contiguous()
     out = torch.full(grids.shape, torch.inf)
     cells = grids.view(torch.uint8).numpy()  # a free cell is 1 in both
-    _path_lengths(cells, source.reshape(-1, 2).contiguous().numpy(), out.numpy())
+    _path_lengths(cells, rows(source), out.numpy())
     return out.view(free.shape)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import torch
-from numba import njit, prange
+from numba import njit
 from torch import Tensor
 
 from forestrl.functional import Cell, SightLines
+from forestrl.kernels.batches import over_batch, rows
 
 _UNKNOWN, _FREE, _OCCUPIED = int(Cell.UNKNOWN), int(Cell.FREE), int(Cell.OCCUPIED)
 
@@ -44,14 +43,14 @@ def _covered(cells: np.ndarray, traversable: np.ndarray) -> np.float32:
     return np.float32(known) / np.float32(total) if total > 0 else np.float32(np.nan)
 
 
-@njit(cache=True, parallel=True)
+@over_batch
 def _sense(
-    trees: np.ndarray, traversable: np.ndarray, before: np.ndarray, width: int,
-    position: np.ndarray, offsets: np.ndarray, between: np.ndarray, after: np.ndarray,
+    first: int, last: int, trees: np.ndarray, traversable: np.ndarray, before: np.ndarray,
+    width: int, position: np.ndarray, offsets: np.ndarray, between: np.ndarray, after: np.ndarray,
     new_cells: np.ndarray, covered: np.ndarray,
 ) -> None:  # fmt: skip
     """Works on maps row by row, ``[B, H * W]``; writes the last three arrays."""
-    for b in prange(len(trees)):
+    for b in range(first, last):
         for i in range(trees.shape[1]):  # as a loop it becomes one copy of memory
             after[b, i] = before[b, i]
         row, col = position[b]
@@ -72,7 +71,7 @@ def sense(
         traversable.reshape(-1, height * width).contiguous().numpy(),
         cells.reshape(-1, height * width).contiguous().numpy(),
         width,
-        position.reshape(-1, 2).contiguous().numpy(),
+        rows(position),
         lines.offsets.numpy(),
         lines.between.numpy(),
         after.view(-1, height * width).numpy(),
@@ -83,11 +82,5 @@ def sense(
 
 
 def are_compiled() -> bool:
-    """Tells whether an earlier process has left compiled kernels; else first uses take seconds.
-
-    Whether they are of this source and for this processor is not looked at.
-    """
-    stats = getattr(_sense, "stats", None)
-    if stats is None:  # numba was told not to compile
-        return True
-    return any(Path(stats.cache_path).glob(f"{Path(__file__).stem}.*.nbi"))
+    """Tells whether an earlier process has left compiled code; else first uses take seconds."""
+    return _sense.is_compiled()

@@ -50,9 +50,9 @@ class Line(NamedTuple):
 LINES = {
     "learned": Line("#08306B", width=2.2),
     "cost_published": Line("#C2410C", (0, (4, 1.5)), "s"),
-    "cost_mended": Line("#C2410C", "-", "s"),
+    "cost_corrected": Line("#C2410C", "-", "s"),
     "mmpf_published": Line("#4D9F7A", (0, (4, 1.5)), "^"),
-    "mmpf_mended": Line("#4D9F7A", "-", "^"),
+    "mmpf_corrected": Line("#4D9F7A", "-", "^"),
     "nearest_frontier": Line("#555555", (0, (6, 1.5, 1, 1.5))),
     "information_gain": Line("#7A3E9D", (0, (2, 1)), "o"),
     "random": Line("#909090", (0, (1, 1.2))),

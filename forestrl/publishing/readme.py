@@ -41,7 +41,7 @@ its rule for ties is its own.
 
 Share of the runs in the nominal forest, in per cent: 98 % of the cells reached, or why not. The
 planners as published keep the faults of Explore-Bench's planning, though not of its LiDAR, and go
-round in cycles or aim at trunks; mended, with path lengths over diagonal moves too and frontiers
+round in cycles or aim at trunks; corrected, with path lengths over diagonal moves too and frontiers
 out of reach left aside, none does. Cycles are detected for planners only: the most probable action
 ends in them too. The last column is the mean coverage at the end of the runs that did not reach
 98 %.

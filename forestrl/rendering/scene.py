@@ -7,7 +7,7 @@ from tensordict import TensorDictBase
 
 from forestrl import functional as F
 from forestrl import keys as K
-from forestrl.kernels.planning import Reason
+from forestrl.status import Status
 
 Cell = tuple[int, ...]
 
@@ -35,8 +35,8 @@ class Scene:
         self.proposed = self.executed = None if action is None else int(action)
         if action is not None and td.get(K.FEASIBLE, None) is not None:
             self.executed = int(F.safe_action(action, feasible))
-        reason = Reason(int(td.get(K.REASON, torch.tensor(Reason.EXPLORING))))
-        self.stopped = "" if reason == Reason.EXPLORING else reason.name.lower().replace("_", " ")
+        status = Status(int(td.get(K.STATUS, torch.tensor(Status.EXPLORING))))
+        self.stopped = "" if status == Status.EXPLORING else status.name.lower().replace("_", " ")
         """Why a planner stays where it is, if it does."""
         room = td.get(K.WAYPOINT, None)
         self.has_graph = room is not None

@@ -12,7 +12,7 @@ from forestrl import keys as K
 from forestrl.envs import ExplorationGraph, ForestEnv
 from forestrl.evaluation import Episodes, evaluate, uniforms
 from forestrl.evaluation.arenas import draw_arenas as arenas_of
-from forestrl.policies.classical import CostBased, NearestFrontier
+from forestrl.planners import CostBased, NearestFrontier
 from tests.evaluation.policies import always, forest, meadow, random_action, random_logits
 
 SIDE = 9  # of the meadow

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from forestrl.learning.checkpoint import TRAINING_FILE, load_training
-from forestrl.policies.released import load_policy
+from forestrl.policies.files import load_policy
 from tests.commands import forestrl, rows, train
 
 HALF, WHOLE = "total_frames=512", "total_frames=1024"

@@ -4,8 +4,8 @@ import pytest
 
 from forestrl import build
 from forestrl.evaluation import evaluate
-from forestrl.policies.classical import RandomWalk
-from forestrl.policies.released import load_policy
+from forestrl.planners import RandomWalk
+from forestrl.policies.files import load_policy
 from tests.commands import compose, train
 
 ARENA = ("env.size=10", "env.n_trees=0", "env.lidar_range=2.0")

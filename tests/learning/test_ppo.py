@@ -10,7 +10,7 @@ from torchrl.envs import TransformedEnv, set_exploration_type
 from forestrl import keys as K
 from forestrl.envs import StaggeredEpisodes
 from forestrl.learning.ppo import PPO
-from forestrl.policies.learned import ActorCritic
+from forestrl.policies.actor_critic import ActorCritic
 from tests.commands import compose
 from tests.envs.worlds import make_forest, paper_transforms
 

@@ -1,0 +1,1 @@
+"""Explore-Bench's planners, as published and corrected."""

@@ -1,0 +1,1 @@
+"""Planners that pick one frontier cell as their goal, at every step anew."""

@@ -1,0 +1,126 @@
+"""The policy's and the critic's network: two GATv2 layers over the exploration graph (Table II)."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import torch
+from torch import Tensor, nn
+from torch_geometric.nn import GATv2Conv
+
+from forestrl import functional as F
+from forestrl.policies.gatv2.encoder import gatv2_encoder
+
+Kernel = Literal["fused", "pyg"]
+Readout = Literal["mean", "concat"]
+
+
+class GATv2Encoder(nn.Module):
+    r"""Encodes an exploration graph into one number per action (Table II).
+
+    Two GATv2 layers with edge lengths, ``8 -> hidden``, ``heads`` heads concatenated, ReLU, then
+    ``heads * hidden -> 1`` with one head. Each layer computes, for node ``i`` and its in-edges
+    ``j -> i``, the self-loop among them,
+
+    .. math::
+        e_{ij} &= a^\top \mathrm{LeakyReLU}(W_l x_j + W_r x_i + w_e d_{ij}) & \text{(Eq. 3)} \\
+        \alpha_{ij} &= \exp(e_{ij}) / \textstyle\sum_k \exp(e_{ik}) & \text{(Eq. 4)} \\
+        x'_i &= \textstyle\sum_j \alpha_{ij} W_l x_j + b & \text{(Eq. 5)}
+
+    with ``d_ij`` the edge's length in units of ``l``. The outputs of nodes 0 to 8, the agent and
+    its waypoints, are the actor's logits for actions 0 to 8.
+
+    Args:
+        hidden: channels per head of layer 1.
+        heads: attention heads of layer 1.
+        kernel: ``"fused"`` computes CPU tensors with :mod:`forestrl.policies.gatv2.passes`, which
+            has no gradient for ``x``; ``"pyg"``, and ``"fused"`` on other devices, with PyTorch
+            Geometric. Both have the same parameters and results.
+        lidar_range: ``l``, cells, the unit of edge lengths.
+        edge_lengths: whether the attention reads them; without, every edge counts as of length 0.
+    """
+
+    def __init__(
+        self,
+        hidden: int = 16,
+        heads: int = 4,
+        kernel: Kernel = "fused",
+        lidar_range: float = 5.0,
+        edge_lengths: bool = True,
+    ) -> None:
+        super().__init__()
+        if kernel not in get_args(Kernel):
+            msg = f"kernel must be one of {get_args(Kernel)}, not {kernel!r}"
+            raise ValueError(msg)
+        for name, value in (("hidden", hidden), ("heads", heads)):
+            if value < 1:
+                msg = f"{name} must be at least 1, not {value}"
+                raise ValueError(msg)
+        self.kernel = kernel
+        self.lidar_range = lidar_range if edge_lengths else math.inf  # the fixed edges' become 0
+        self.edge_lengths = edge_lengths
+        self.conv1 = GATv2Conv(F.FEATURES, hidden, heads=heads, edge_dim=1, add_self_loops=False)
+        self.conv2 = GATv2Conv(heads * hidden, 1, edge_dim=1, add_self_loops=False)
+
+    def forward(self, x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor) -> Tensor:
+        """Computes the outputs of nodes 0 to 8.
+
+        Args:
+            x: node features, ``[*B, 9 + M, 8]``.
+            waypoint: the waypoint each frontier is tied to, int64 ``[*B, M]``.
+            length: the length of that edge in units of ``l``, ``[*B, M]``.
+            frontiers: the number of frontiers, int64 ``[*B, 1]``.
+
+        Returns:
+            ``[*B, 9]``.
+        """
+        if not self.edge_lengths:
+            length = torch.zeros_like(length)
+        if self.kernel == "fused" and x.device.type == "cpu":
+            return gatv2_encoder(
+                x, waypoint, length, frontiers, self.conv1, self.conv2, lidar_range=self.lidar_range
+            )
+        return self._pyg(x, waypoint, length, frontiers)
+
+    def _pyg(self, x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor) -> Tensor:
+        """Runs PyTorch Geometric on the batch as one graph, without the padding none uses."""
+        batch, room = x.shape[:-2], waypoint.shape[-1]
+        room = min(room, int(frontiers.max())) if frontiers.numel() else 0
+        waypoint, length = waypoint[..., :room], length[..., :room]
+        edge_index, edge_attr = F.edges(waypoint, length, frontiers, lidar_range=self.lidar_range)
+        nodes = F.WAYPOINTS + room
+        x = x[..., :nodes, :].reshape(-1, F.FEATURES)
+        edge_index = edge_index.reshape(-1, *edge_index.shape[-2:])  # (B, 2, E)
+        offset = nodes * torch.arange(len(edge_index), device=x.device)
+        edge_index = (edge_index + offset[:, None, None]).transpose(0, 1).flatten(1)
+        edge_attr = edge_attr.reshape(-1, 1)
+        hidden = self.conv1(x, edge_index, edge_attr).relu()
+        out = self.conv2(hidden, edge_index, edge_attr)
+        return out.view(*batch, nodes)[..., : F.WAYPOINTS]
+
+
+class Critic(nn.Module):
+    """Estimates a state's value from the nine outputs of an encoder (Table II).
+
+    Args:
+        encoder: maps a graph to ``[*B, 9]``; a :class:`GATv2Encoder` of its own.
+        readout: how the nine outputs are aggregated before the fully connected layer: ``"mean"``
+            to ``[*B, 1]``, or ``"concat"`` to ``[*B, 9]``.
+    """
+
+    def __init__(self, encoder: nn.Module, readout: Readout = "mean") -> None:
+        super().__init__()
+        if readout not in get_args(Readout):
+            msg = f"readout must be one of {get_args(Readout)}, not {readout!r}"
+            raise ValueError(msg)
+        self.encoder = encoder
+        self.readout = readout
+        self.linear = nn.Linear(F.WAYPOINTS if readout == "concat" else 1, 1)
+
+    def forward(self, x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor) -> Tensor:
+        """Estimates the value ``[*B, 1]``; for the arguments see :class:`GATv2Encoder`."""
+        outputs = self.encoder(x, waypoint, length, frontiers)
+        if self.readout == "mean":
+            outputs = outputs.mean(-1, keepdim=True)
+        return self.linear(outputs)
