@@ -6,18 +6,16 @@ import csv
 import io
 import itertools
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
-from hydra.utils import instantiate
-from omegaconf import DictConfig
-from torchrl.envs import Compose, TransformedEnv
+from omegaconf import DictConfig, OmegaConf
 from tqdm.auto import tqdm
 
 from forestrl import build
 from forestrl.command import asked_for, command
-from forestrl.envs import ExplorationGraph, ForestEnv, SafetyFilter
 from forestrl.evaluation.episodes import evaluate
 from forestrl.planners import RandomWalk
 from forestrl.storage import atomic_write
@@ -27,15 +25,12 @@ _COLUMNS = ("policy", "filter", "size", "n_trees", "steps", "interventions", "co
 
 def count(cfg: DictConfig, policy: Any, forest: dict[str, int], filtered: bool) -> dict[str, Any]:
     """Runs a policy in forests of one kind and counts steps, interventions and collisions."""
-    settings = cfg.collisions
-
-    def make_env(arenas: int) -> TransformedEnv:
-        env: ForestEnv = instantiate(cfg.env, **forest, num_envs=arenas)
-        graph: ExplorationGraph = instantiate(cfg.graph)
-        return TransformedEnv(env, Compose(*([SafetyFilter()] if filtered else []), graph))
-
+    settings, changed = cfg.collisions, cfg.copy()
+    OmegaConf.update(changed, "env", forest)
+    if not filtered:
+        OmegaConf.update(changed, "safety", {"_target_": None}, merge=False)
     episodes = evaluate(
-        make_env,
+        partial(build.make_env, changed, policy=policy),
         policy,
         seed=settings.seed,
         indices=range(settings.arenas),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from forestrl.evaluation.metrics import eval_metrics
 from forestrl.evaluation.parts import Parts
 from forestrl.evaluation.picture import draw_episode
 from forestrl.evaluation.report import table, write_report
-from forestrl.loggers import Logger
+from forestrl.loggers import Logger, NoLogger
 from forestrl.paper import ARENA
 
 
@@ -33,7 +34,7 @@ def run(cfg: DictConfig, policy: Any, parts: Parts) -> Episodes:
     )
     with bar:
         return evaluate(
-            lambda arenas: build.make_env(cfg, num_envs=arenas),
+            partial(build.make_env, cfg, policy=policy),
             policy,
             seed=settings.seed,
             indices=range(settings.first, settings.first + settings.arenas),
@@ -52,12 +53,13 @@ def main(cfg: DictConfig) -> float:
     build.prepare(cfg)
     build.require_positive(cfg, "eval.arenas", "eval.steps", "eval.batch")
     build.make_output_folder(folder)
+    cfg = build.as_trained(cfg, asked_for())
     policy, about = build.make_policy(cfg, asked_for())
     logger = build.make_logger(cfg, folder)
     failed = True
     try:
         episodes, summary = report(cfg, policy, about, folder)
-        if cfg.logger.name != "none":
+        if not isinstance(logger, NoLogger):
             log(cfg, policy, logger, folder, episodes, summary)
         failed = False
     finally:
@@ -107,7 +109,7 @@ def log(
     logger.log_figure("eval/interventions", folder / "interventions.png", step=0)
     logger.log_table("eval/episodes", folder / "episodes.csv")
     draw_episode(
-        build.make_env(cfg, num_envs=1),
+        build.make_env(cfg, 1, policy),
         policy,
         picture,
         seed=settings.seed,

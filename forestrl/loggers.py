@@ -5,11 +5,31 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
 from forestrl.storage import atomic_write
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a logger is told of the run: its first argument, before its own settings."""
+
+    folder: Path
+    """The run folder."""
+    frames: int = 0
+    """Frames the run goes on from; 0 for a new one."""
+    id: str | None = None
+    """The dashboard's id of the run that goes on."""
+    config: Mapping[str, Any] = field(default_factory=dict)
+    """The resolved configuration."""
+    command: str = "train"
+    overrides: tuple[str, ...] = ()
+    sweep: Path | None = None
+    """The folder of the sweep whose job this is."""
+    experiment: str | None = None
 
 
 class Logger(Protocol):
@@ -32,7 +52,13 @@ class Logger(Protocol):
 
 
 class NoLogger:
-    """Writes nothing."""
+    """Writes nothing.
+
+    Args:
+        run: the run.
+    """
+
+    def __init__(self, run: Run | None = None) -> None: ...
 
     def log_metrics(self, metrics: dict[str, float], step: int) -> None:
         """Ignores the metrics."""
@@ -57,17 +83,16 @@ class CsvLogger(NoLogger):
     on with a run keeps its rows up to the point where it goes on.
 
     Args:
-        path: the file.
-        frames: frames the run goes on from; 0 for a new one.
+        run: gives the folder, and the frames that the run goes on from.
     """
 
-    def __init__(self, path: Path, frames: int = 0) -> None:
-        self.path, self.columns, self.rows = path, ["frames"], []
-        if frames and path.exists():
-            with path.open(newline="") as file:
+    def __init__(self, run: Run) -> None:
+        self.path, self.columns, self.rows = run.folder / "metrics.csv", ["frames"], []
+        if run.frames and self.path.exists():
+            with self.path.open(newline="") as file:
                 reader = csv.DictReader(file)
                 self.columns = list(reader.fieldnames or self.columns)
-                self.rows = [row for row in reader if int(row["frames"]) <= frames]
+                self.rows = [row for row in reader if int(row["frames"]) <= run.frames]
         self._rewrite()
 
     def log_metrics(self, metrics: dict[str, float], step: int) -> None:
@@ -90,12 +115,16 @@ class CsvLogger(NoLogger):
 
 
 class TensorboardLogger(NoLogger):
-    """Writes the scalars as TensorBoard event files; pictures stay in the run folder."""
+    """Writes the scalars as TensorBoard event files; pictures stay in the run folder.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        run: gives the folder.
+    """
+
+    def __init__(self, run: Run) -> None:
         from torch.utils.tensorboard import SummaryWriter
 
-        self.writer = SummaryWriter(str(folder))
+        self.writer = SummaryWriter(str(run.folder / "tensorboard"))
 
     def log_metrics(self, metrics: dict[str, float], step: int) -> None:
         """Adds a point to every curve."""
@@ -111,19 +140,43 @@ class TensorboardLogger(NoLogger):
 class WandbLogger(NoLogger):
     """Writes a Weights & Biases run, offline unless the user is logged in or says otherwise.
 
+    The run is named after its overrides; the jobs of a sweep share one folder and one group.
+
     Args:
-        folder: where the ``wandb`` folder goes; jobs of one sweep share it.
-        config: the resolved configuration.
-        settings: further arguments of ``wandb.init``.
+        run: the run.
+        project: on the dashboard.
+        entity: team or user; None for the default.
+        group: None for the sweep's folder, or the experiment.
+        dir: where the ``wandb`` folder goes; None for the sweep's folder, or the run's.
     """
 
-    def __init__(self, folder: Path, config: dict[str, Any], **settings: Any) -> None:
+    def __init__(
+        self,
+        run: Run,
+        project: str = "forestrl",
+        entity: str | None = None,
+        group: str | None = None,
+        dir: str | None = None,
+    ) -> None:
         import wandb
 
         self.wandb = wandb
         mode: Any = os.environ.get("WANDB_MODE") or ("online" if _logged_in() else "offline")
+        folder = Path(dir) if dir else run.sweep or run.folder
         folder.mkdir(parents=True, exist_ok=True)
-        self.run = wandb.init(dir=str(folder), config=config, mode=mode, **settings)
+        self.run = wandb.init(
+            dir=str(folder),
+            config=dict(run.config),
+            mode=mode,
+            project=project,
+            entity=entity,
+            group=group or (run.sweep.name if run.sweep else run.experiment),
+            job_type=run.command,
+            name=",".join(run.overrides)[:120] or None,
+            tags=[override[:64] for override in run.overrides],
+            id=run.id,
+            resume="allow" if run.id else None,
+        )
         self.run.define_metric("frames")
         self.run.define_metric("*", step_metric="frames")
 

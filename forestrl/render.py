@@ -18,11 +18,12 @@ def main(cfg: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     build.prepare(cfg)
     build.make_output_folder(folder)
+    cfg = build.as_trained(cfg, asked_for())
     policy, _ = build.make_policy(cfg, asked_for())
     settings = cfg.render
     build.require_positive(cfg, "render.steps", "render.every", "render.fps", "render.scale")
     draw_episode(
-        build.make_env(cfg, num_envs=1),
+        build.make_env(cfg, 1, policy),
         policy,
         folder / "episode.gif",
         seed=settings.seed,

@@ -9,7 +9,6 @@ from typing import Any
 
 import torch
 from hydra.core.hydra_config import HydraConfig
-from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 from tensordict import TensorDictBase
 
@@ -41,8 +40,9 @@ class Training:
         torch.manual_seed(cfg.seed)
         self.cfg, self.run_dir = cfg, run_dir
         self.networks = build.make_networks(cfg)
-        self.ppo = instantiate(cfg.algo, self.networks.make_actor(), self.networks.make_critic())
+        self.ppo = build.make_ppo(cfg, self.networks)
         self.env = build.make_training_env(cfg)
+        build.check_model(cfg, self.networks, self.env)
         self.collector = build.make_collector(cfg, self.env, self.ppo.actor)
         self.policy = self.networks.make_policy()
         self.frames, self.best, self.logger_id = 0, float("-inf"), None
@@ -68,7 +68,7 @@ class Training:
             start = time.perf_counter()
             batch = next(collected)
             middle = time.perf_counter()
-            metrics = summarize(batch) | self.ppo.update(batch)
+            metrics = summarize(batch, self.env.transform) | self.ppo.update(batch)
             end = time.perf_counter()
             self.frames += batch.numel()
             metrics |= _timing(batch, middle - start, end - middle)
@@ -116,11 +116,7 @@ class Training:
         """Writes the policy, and for the latest the training state beside it."""
         folder = self.run_dir / "checkpoints" / alias
         folder.mkdir(parents=True, exist_ok=True)
-        about = {
-            "frames": self.frames,
-            "seed": self.cfg.seed,
-            "env": OmegaConf.to_container(self.cfg.env, resolve=True),
-        }
+        about = {"frames": self.frames, "seed": self.cfg.seed}
         save_policy(folder / POLICY_FILE, build.to_policy(self.cfg, self.networks, about))
         if alias == "latest":
             progress = {"frames": self.frames, "best": self.best, "logger_id": self.logger_id}

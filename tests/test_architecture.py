@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
 
 L0 = {"functional", "kernels"}
-L1 = {"keys", "paper", "status", "storage", "progress"}
+L1 = {"keys", "paper", "sampling", "status", "storage", "progress"}
 L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "benchmark"}
 L3 = {"config", "command", "loggers", "build"}
@@ -20,16 +20,18 @@ ROOMS = {  # room: the other rooms it may import from
     "functional": set(),
     "kernels": {"functional"},
     **{name: set() for name in L1},
+    "sampling": {"keys"},
     **dict.fromkeys(L2, L0 | L1),
+    "planner": L0 | L1 | L2,
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
-    "benchmark": L0 | L1 | {"envs", "policies", "learning", "evaluation"},
+    "benchmark": L0 | L1 | L2 | {"evaluation"},
     "publishing": {"paper"},
     "config": set(),
     "command": {"config"},
     "loggers": {"storage"},
     "build": L0 | L1 | L2 | STUDIES | {"config", "loggers"},
-    **dict.fromkeys(L4, {""} | L0 | L1 | L2 | STUDIES | L3),
+    **dict.fromkeys(L4, {""} | L0 | L1 | L2 | STUDIES | L3 | {"planner"}),
     "cli": {""},
 }
 LIBRARIES = {  # the only libraries of these rooms, besides Python's own
@@ -38,6 +40,7 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "kernels": {"torch", "numba", "numpy"},
     "planners": {"torch", "tensordict", "numba", "numpy"},
     "keys": {"torch", "tensordict"},
+    "sampling": {"torch", "tensordict"},
     "paper": set(),
     "status": set(),
     "storage": set(),
@@ -103,6 +106,18 @@ def test_rooms_import_their_libraries_only(module):
 def test_nothing_below_the_assembler_knows_hydra_or_wandb(module):
     _, home, _, libraries = module
     assert home not in L0 | L1 | L2 | STUDIES or not libraries & {"hydra", "omegaconf", "wandb"}
+
+
+def test_the_rooms_of_one_floor_meet_through_keys_only():
+    assert not any(ROOMS[room] & (L2 - {room}) for room in L2)
+
+
+def test_no_rooms_import_each_other_in_a_circle():
+    reached = {name: set(below) for name, below in ROOMS.items()}
+    for _ in ROOMS:
+        for below in reached.values():
+            below |= set().union(*(reached[name] for name in below))
+    assert not [name for name, below in reached.items() if name in below]
 
 
 def test_functional_modules_are_in_order(module):

@@ -12,8 +12,8 @@ from forestrl import kernels
 from forestrl import keys as K
 from forestrl.benchmark.states import arrange, enter, explore
 from forestrl.benchmark.timing import measure
-from forestrl.envs import ForestEnv
 from tests.commands import forestrl
+from tests.envs.worlds import forest_env
 
 DECISIONS = ("decision", "decision + filter", "graph to filter")
 PIPELINE = [
@@ -174,7 +174,7 @@ def test_bad_settings_end_with_one_line(override, words, tmp_path):
 
 @pytest.fixture(scope="module")
 def forest():
-    return ForestEnv(size=20, n_trees=8, num_envs=6)
+    return forest_env(size=20, n_trees=8, num_envs=6)
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def test_only_without_the_filter_there_are_collisions(tmp_path):
     [
         ("policy=random", "policy=random is not allowed"),
         ("collisions.steps=0", "collisions.steps=0 is not allowed"),
-        ("graph.window=5", "its window is 7, but window=5 was asked for"),
+        ("graph.window=5", "was made with graph.window=7, but graph.window=5 was asked for"),
     ],
 )
 def test_what_cannot_be_compared_is_refused(override, words, tmp_path):

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from hydra.errors import InstantiationException
 from omegaconf import OmegaConf
 from PIL import Image
 
-from forestrl.policies.files import POLICY_FILE, Policy, load_policy, save_policy
+from forestrl.policies.files import POLICY_FILE, Described, load_policy, save_policy
 from tests.commands import SHORT, forestrl, rows, train
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -75,7 +76,9 @@ def test_a_job_that_fails_does_not_stop_the_sweep(tmp_path):
     sweep = ("-m", "env.size=2,14", f"hydra.sweep.dir={tmp_path}")
     result = forestrl("train", "experiment=smoke", *sweep, *SHORT)
     assert result.status == 1
-    assert result.err.splitlines()[-1].endswith("size=2 is not allowed: it must be at least 3")
+    assert result.err.splitlines()[-1].endswith(
+        "must be a side or [rows, columns] of at least 3 cells"
+    )
     assert len(rows(tmp_path / "1/metrics.csv")) == 1
 
 
@@ -121,11 +124,11 @@ def test_with_the_filter_there_are_no_collisions_and_without_it_there_are(run, t
 
 REFUSED = [
     ("nope=1", "there is no setting 'nope'"),
-    ("env.size=2", "size=2 .*at least 3"),
+    ("env.size=2", "shape=2 .*at least 3"),
     ("env.size=large", "env.size=large .*a whole number"),
     ("env.size=14.5", "env.size=14.5 .*a whole number"),
     ("env.n_trees=-1", "n_trees=-1 .*0 or more"),
-    ("env.n_trees=100000", "n_trees=100000 .*no free cell .*size=14"),
+    ("env.n_trees=100000", "n_trees=100000 .*no free cell .*14 x 14"),
     ("env.tree_radius=[3,1]", r"tree_radius=\[3, 1\] .*smallest, largest"),
     ("env.tree_radius=3", "env.tree_radius=3 .*a list"),
     ("env.num_envs=3", "env.num_envs=3 .*divide algo.frames_per_batch=256"),
@@ -174,8 +177,8 @@ def test_an_output_folder_that_cannot_be_written_is_said_in_one_line(tmp_path):
 @pytest.fixture
 def policy_file(run, tmp_path):
     policy = load_policy(run)
-    model = policy.model | {"lidar_range": 7.0}
-    save_policy(tmp_path / POLICY_FILE, Policy(model, 9, {}, policy.weights))
+    graph = Described("exploration_graph", {"window": 9})
+    save_policy(tmp_path / POLICY_FILE, replace(policy, observation=graph))
     return tmp_path / POLICY_FILE
 
 
@@ -186,8 +189,12 @@ def test_checkpoints_that_do_not_do_are_said_in_one_line(name, policy_file, tmp_
         return refusal(forestrl(name, *ARENAS[:2], f"checkpoint={checkpoint}", folder, *settings))
 
     assert f"checkpoint={tmp_path}/none does not exist" in line(tmp_path / "none")
-    assert "its heads is 4, but heads=2 was" in line(policy_file, "model.heads=2")
-    assert "its window is 9, but window=7 was" in line(policy_file, "graph.window=7")
+    assert "was made with model.heads=4, but model.heads=2 was" in line(
+        policy_file, "model.heads=2"
+    )
+    assert "was made with graph.window=9, but graph.window=7 was" in line(
+        policy_file, "graph.window=7"
+    )
     policy_file.write_bytes(policy_file.read_bytes()[:200])
     assert f"checkpoint={policy_file} cannot be read" in line(policy_file)
 
@@ -199,7 +206,7 @@ def test_a_policy_brings_its_own_window(policy_file, tmp_path):
 def test_debug_lets_the_error_through(tmp_path):
     with pytest.raises(InstantiationException) as caught:
         forestrl("train", "env.size=2", "debug=true", f"hydra.run.dir={tmp_path}")
-    assert "size=2" in str(caught.value.__cause__)
+    assert "shape=2" in str(caught.value.__cause__)
 
 
 def test_the_process_ends_with_the_status_and_only_debug_prints_a_traceback(tmp_path):

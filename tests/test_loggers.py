@@ -10,7 +10,7 @@ import pytest
 from omegaconf import OmegaConf
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from forestrl.loggers import CsvLogger, Loggers, NoLogger, TensorboardLogger
+from forestrl.loggers import CsvLogger, Loggers, NoLogger, Run, TensorboardLogger
 from tests.commands import forestrl, rows, train
 
 ROLLOUT = "return coverage episode_length steps_to_80 steps_to_90 steps_to_98 finished"
@@ -42,21 +42,21 @@ def path(tmp_path):
 
 
 def test_csv_has_a_row_a_call_and_frames_first(path):
-    logger = CsvLogger(path)
+    logger = CsvLogger(Run(path.parent))
     logger.log_metrics({"a": 1.0, "b": 0.123456789}, step=10)
     logger.log_metrics({"a": 2.5, "b": -1e-9}, step=20)
     assert table(path) == [["frames", "a", "b"], ["10", "1", "0.123457"], ["20", "2.5", "-1e-09"]]
 
 
 def test_csv_leaves_nan_and_what_is_missing_empty(path):
-    logger = CsvLogger(path)
+    logger = CsvLogger(Run(path.parent))
     logger.log_metrics({"a": math.nan, "b": 1.0}, step=10)
     logger.log_metrics({"b": 2.0}, step=20)
     assert table(path)[1:] == [["10", "", "1"], ["20", "", "2"]]
 
 
 def test_csv_appends_columns_that_appear_later(path):
-    logger = CsvLogger(path)
+    logger = CsvLogger(Run(path.parent))
     logger.log_metrics({"a": 1.0}, step=10)
     logger.log_metrics({"eval/a": 3.0, "a": 2.0}, step=20)
     logger.log_metrics({"a": 4.0}, step=30)
@@ -69,17 +69,17 @@ def test_csv_appends_columns_that_appear_later(path):
 
 
 def test_csv_drops_later_rows_when_a_run_goes_on(path):
-    logger = CsvLogger(path)
+    logger = CsvLogger(Run(path.parent))
     for step in (10, 20, 30):
         logger.log_metrics({"a": step / 10}, step=step)
-    logger = CsvLogger(path, frames=20)
+    logger = CsvLogger(Run(path.parent, frames=20))
     logger.log_metrics({"a": 9.0, "b": 1.0}, step=30)
     assert table(path) == [["frames", "a", "b"], ["10", "1", ""], ["20", "2", ""], ["30", "9", "1"]]
 
 
 def test_csv_of_a_new_run_replaces_the_old_one(path):
-    CsvLogger(path).log_metrics({"a": 1.0}, step=10)
-    CsvLogger(path)
+    CsvLogger(Run(path.parent)).log_metrics({"a": 1.0}, step=10)
+    CsvLogger(Run(path.parent))
     assert table(path) == [["frames"]]
 
 
@@ -93,11 +93,11 @@ def test_no_logger_takes_everything_and_writes_nothing(tmp_path):
 
 
 def test_tensorboard_has_the_curves(tmp_path):
-    logger = TensorboardLogger(tmp_path)
+    logger = TensorboardLogger(Run(tmp_path))
     logger.log_metrics({"a/b": 1.0, "a/c": math.nan}, step=10)
     logger.log_metrics({"a/b": 2.0}, step=20)
     logger.close()
-    events = EventAccumulator(str(tmp_path)).Reload()
+    events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
     assert events.Tags()["scalars"] == ["a/b"]
     assert [(event.step, event.value) for event in events.Scalars("a/b")] == [(10, 1.0), (20, 2.0)]
 

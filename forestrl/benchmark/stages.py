@@ -27,7 +27,6 @@ from typing import TypeVar
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torchrl.collectors import Collector
 from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
@@ -36,6 +35,7 @@ from forestrl import kernels
 from forestrl import keys as K
 from forestrl.benchmark.states import enter
 from forestrl.envs import ExplorationGraph
+from forestrl.learning.collector import ArenaCollector
 from forestrl.learning.ppo import PPO
 from forestrl.policies.actor_critic import ActorCritic
 
@@ -66,7 +66,7 @@ class Parts:
     evaluation: EnvBase
     networks: ActorCritic
     ppo: PPO
-    make_collector: Callable[[], Collector] | None
+    make_collector: Callable[[], ArenaCollector] | None
 
 
 def env_step(env: EnvBase, worlds: Sequence[TensorDict]) -> Call:
@@ -110,13 +110,13 @@ def advantage(ppo: PPO, batch: TensorDictBase) -> Call:
 def minibatch(ppo: PPO, batch: TensorDictBase) -> Call:
     """Learns from one shuffled minibatch after the other."""
     ppo.estimate_advantage(batch)
-    ppo.fill(batch)
-    return _in_turn(ppo.step, ppo.shuffled.sample().split(ppo.minibatch_size))
+    frames = batch.select(*ppo.learns_from).reshape(-1)
+    return _in_turn(ppo.step, frames[torch.randperm(len(frames))].split(ppo.minibatch_size))
 
 
-def start_collecting(collector: Collector, worlds: TensorDict) -> None:
+def start_collecting(collector: ArenaCollector, worlds: TensorDict) -> None:
     """Puts the arenas of a collector into explored worlds."""
-    collector._carrier.update(enter(collector.env, worlds).exclude(K.ACTION))
+    collector.arenas = enter(collector.env, worlds).exclude(K.ACTION)
 
 
 def decision(parts: Parts, worlds: Sequence[TensorDict]) -> dict[str, Call]:

@@ -85,7 +85,7 @@ def enter(env: EnvBase, worlds: TensorDict) -> TensorDictBase:
         the state to step from, with random actions, feasible or not.
     """
     given = TensorDict({K.TREES: worlds["trees"], K.POSITION: worlds["start"]}, env.batch_size)
-    state = env.reset(given)
+    state = env.reset(given, set_state=True)
     state[K.CELLS], state[K.POSITION] = worlds["cells"], worlds["position"]
     state[K.STEP_COUNT] = worlds["phase"].unsqueeze(-1) - 1
     if _HORIZON in state.keys():

@@ -1,14 +1,27 @@
 """The world as TorchRL sees it: the forest, and the paper's three contributions as transforms."""
 
-from forestrl.envs.forest import ForestEnv, sample_arena
+from collections.abc import Mapping
+
+from torchrl.envs.transforms import Transform
+
+from forestrl.envs.forest import ForestEnv
 from forestrl.envs.training import StaggeredEpisodes
 from forestrl.envs.transforms import ExplorationGraph, FrontierPotentialReward, SafetyFilter
+from forestrl.envs.worlds import RandomForest, World
+
+OBSERVATIONS: Mapping[str, type[Transform]] = {"exploration_graph": ExplorationGraph}
+"""The observations that a policy file may name."""
+WORLDS: Mapping[str, type[World]] = {"random_forest": RandomForest}
+"""The sources of worlds that a policy file may name."""
 
 __all__ = [
+    "OBSERVATIONS",
+    "WORLDS",
     "ExplorationGraph",
     "ForestEnv",
     "FrontierPotentialReward",
+    "RandomForest",
     "SafetyFilter",
     "StaggeredEpisodes",
-    "sample_arena",
+    "World",
 ]

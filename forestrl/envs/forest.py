@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+import secrets
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -14,103 +14,88 @@ from torchrl.envs import EnvBase
 from forestrl import functional as F
 from forestrl import kernels
 from forestrl import keys as K
-
-SMALLEST_SIZE = 3
-_ATTEMPTS = 8  # forests drawn before giving up on finding one with a free cell
+from forestrl.envs.worlds import RandomForest, World
 
 
 class ForestEnv(EnvBase):
-    """One agent with a LiDAR explores a square arena of tree trunks (Sec. II-A).
+    """One agent with a LiDAR explores an arena of tree trunks (Sec. II-A).
 
     The state travels in the TensorDict: ``step`` is a pure function of its input, and any
     situation a test can write down can be stepped from. The reward is ``n^e_t``, the number of
     newly seen cells; shaping it (Eq. 6) is a transform's business. An infeasible action leaves the
     agent where it is and raises ``("safety", "collision")``.
 
-    ``reset(td)`` with ``("arena", "trees")`` in ``td`` starts in that world, at
-    ``("agent", "position")`` if that is given too; a partial reset (``"_reset"`` in ``td``) always
-    draws new arenas.
+    ``reset(td, set_state=True)`` starts in the state that ``td`` holds. It needs
+    ``("arena", "trees")``; what else of the state is there is taken as it is, and the rest follows
+    from it: without ``("agent", "position")`` the start is drawn from the largest component,
+    without ``("map", "cells")`` the map is that of a first scan.
 
     Args:
-        size: arena side ``h``, cells.
-        n_trees: number of trunks ``n_t``.
-        tree_radius: range of trunk radii ``r_t``, cells.
+        world: where arenas and starts come from; by default forests of Table III.
         lidar_range: sensor range ``l``, cells.
         coverage_goal: exploration threshold ``rho*``, a share of the traversable cells.
         max_steps: step budget ``n_s*``.
         num_envs: arenas stepped at once; ``None`` for an env without batch dimension.
-        seed: seed of the env's own generator.
+        seed: seed of the env's own generator; ``None`` for one that no other env has.
         device: where the arenas live.
 
     Raises:
         ValueError: if a value is out of its range; the message names both.
 
     Examples:
-        >>> env = ForestEnv(size=20, n_trees=5, num_envs=3)
+        >>> env = ForestEnv(RandomForest(20, n_trees=5), num_envs=3)
         >>> env.reset()["map", "cells"].shape
         torch.Size([3, 20, 20])
     """
 
+    _supports_set_state = True  # TorchRL's own word for reset(td, set_state=True)
+
     def __init__(
         self,
-        size: int = 50,
-        n_trees: int = 45,
-        tree_radius: tuple[float, float] = (1.0, 3.0),
+        world: World | None = None,
         lidar_range: float = 5.0,
         coverage_goal: float = 0.98,
         max_steps: int = 2500,
         num_envs: int | None = None,
-        seed: int = 0,
+        seed: int | None = None,
         device: torch.device | str = "cpu",
     ) -> None:
-        _check("size", size, size >= SMALLEST_SIZE, f"at least {SMALLEST_SIZE}")
-        _check("n_trees", n_trees, n_trees >= 0, "0 or more")
-        ordered = len(tree_radius) == 2 and 0 < tree_radius[0] <= tree_radius[1]
-        _check(
-            "tree_radius",
-            list(tree_radius),
-            ordered,
-            "[smallest, largest] with 0 < smallest <= largest",
-        )
         in_sight = lidar_range >= math.sqrt(2)
         _check("lidar_range", lidar_range, in_sight, "at least 1.415: the 8 neighbours are seen")
         _check("coverage_goal", coverage_goal, 0 < coverage_goal <= 1, "in (0, 1]")
         _check("max_steps", max_steps, max_steps >= 1, "at least 1")
         _check("num_envs", num_envs, num_envs is None or num_envs >= 1, "at least 1")
         super().__init__(device=device, batch_size=[] if num_envs is None else [num_envs])
-        self.size, self.n_trees = size, n_trees
-        self.tree_radius = (tree_radius[0], tree_radius[1])
+        self.world: World = RandomForest() if world is None else world
         self.coverage_goal, self.max_steps = coverage_goal, max_steps
         self.lidar_range = lidar_range
         lines = F.sight_lines(lidar_range)
         self.sight_lines = F.SightLines(*(part.to(self.device) for part in lines))
         self._make_specs()
         self.set_seed(seed)
-        sample_arena(self, generator=torch.Generator(self.device).manual_seed(0))  # is one possible
+        once = torch.Generator(self.device).manual_seed(0)
+        _check_arenas(*self.world.sample((), generator=once), self.world.shape)
 
-    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
-        given = tensordict if tensordict is not None else TensorDict()
-        mask = given.get("_reset", None)
+    def _reset(
+        self, tensordict: TensorDictBase | None = None, *, set_state: bool = False
+    ) -> TensorDictBase:
+        mask = None if tensordict is None else tensordict.get("_reset", None)
+        if mask is not None:
+            mask = mask.reshape(self.batch_size)
+        if set_state and tensordict is not None:
+            rows = tensordict if mask is None else tensordict[mask]
+            fresh = self._restored(rows.to(self.device))
+        else:
+            batch = self.batch_size if mask is None else (int(mask.sum()),)
+            fresh = self._start(*self.world.sample(tuple(batch), generator=self.rng))
         if mask is None:
-            return self._start(*self._arenas(self.batch_size, given))
-        mask = mask.reshape(self.batch_size)
-        fresh = self._start(*self._arenas((int(mask.sum()),), TensorDict()))
+            return fresh
         state = fresh.new_zeros(self.batch_size) if fresh.numel() else self._blank()
         state[mask] = fresh
         return state
 
     def _blank(self) -> TensorDictBase:
         return self.full_observation_spec.zero().update(self.full_done_spec.zero())
-
-    def _arenas(self, batch: tuple[int, ...], given: TensorDictBase) -> tuple[Tensor, Tensor]:
-        """Takes or draws trunks and start: bool ``[*batch, h, h]`` and int64 ``[*batch, 2]``."""
-        trees, position = given.get(K.TREES, None), given.get(K.POSITION, None)
-        if trees is None:
-            return sample_arena(self, batch, generator=self.rng)
-        _check_world(trees, position, (*batch, self.size, self.size))
-        if position is None:
-            position = F.sample_position(kernels.largest_component(~trees), self.rng)
-        return trees, position
 
     def _start(self, trees: Tensor, position: Tensor) -> TensorDictBase:
         """Senses for the first time from the start of an episode."""
@@ -121,9 +106,27 @@ class ForestEnv(EnvBase):
         state = self._sense(trees, traversable, blank, position, no, steps).exclude("reward")
         return state.update({key: no.clone() for key in ("done", "terminated", "truncated")})
 
+    def _restored(self, given: TensorDictBase) -> TensorDictBase:
+        """The state that is given, completed where it says nothing."""
+        trees, position = given.get(K.TREES, None), given.get(K.POSITION, None)
+        if trees is None:
+            raise ValueError('reset(td, set_state=True) needs ("arena", "trees") in td')
+        _check_arenas(trees, position, (*given.batch_size, *self.world.shape))
+        if position is None:
+            position = F.sample_position(kernels.largest_component(~trees), self.rng)
+        state = self._start(trees, position)
+        known = [
+            key for key in self.state_spec.keys(True, True) if given.get(key, None) is not None
+        ]
+        state.update(given.select(*known).clone())
+        if K.CELLS in known:
+            state[K.COVERAGE] = F.coverage(state[K.CELLS], state[K.TRAVERSABLE])
+        return state
+
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        trees = tensordict[K.TREES]
-        position, collision = F.move(trees, tensordict[K.POSITION], tensordict[K.ACTION])
+        trees, action = tensordict[K.TREES], tensordict[K.ACTION]
+        F.check_action(action)
+        position, collision = F.move(trees, tensordict[K.POSITION], action)
         return self._sense(
             trees,
             tensordict[K.TRAVERSABLE],
@@ -165,13 +168,14 @@ class ForestEnv(EnvBase):
         )
 
     def _make_specs(self) -> None:
-        b, h = self.batch_size, self.size
+        b, (height, width) = self.batch_size, self.world.shape
+        last = torch.tensor([height - 1, width - 1]).expand(*b, 2)
         entries = {
-            K.TREES: Binary(shape=(*b, h, h), dtype=torch.bool),
-            K.TRAVERSABLE: Binary(shape=(*b, h, h), dtype=torch.bool),
-            K.CELLS: Categorical(len(F.Cell), shape=(*b, h, h), dtype=torch.uint8),
-            K.POSITION: Bounded(0, h - 1, shape=(*b, 2), dtype=torch.int64),
-            K.NEW_CELLS: Bounded(0.0, float(h * h), shape=(*b, 1)),
+            K.TREES: Binary(shape=(*b, height, width), dtype=torch.bool),
+            K.TRAVERSABLE: Binary(shape=(*b, height, width), dtype=torch.bool),
+            K.CELLS: Categorical(len(F.Cell), shape=(*b, height, width), dtype=torch.uint8),
+            K.POSITION: Bounded(torch.zeros_like(last), last, shape=(*b, 2), dtype=torch.int64),
+            K.NEW_CELLS: Bounded(0.0, float(height * width), shape=(*b, 1)),
             K.COVERAGE: Bounded(0.0, 1.0, shape=(*b, 1)),
             K.COLLISION: Binary(shape=(*b, 1), dtype=torch.bool),
             K.STEP_COUNT: Bounded(0, self.max_steps, shape=(*b, 1), dtype=torch.int64),
@@ -190,39 +194,8 @@ class ForestEnv(EnvBase):
         )
 
     def _set_seed(self, seed: int | None) -> None:
-        self.rng = torch.Generator(device=self.device).manual_seed(seed or 0)
-
-
-def sample_arena(
-    env: ForestEnv, batch: tuple[int, ...] = (), *, generator: torch.Generator
-) -> tuple[Tensor, Tensor]:
-    """Draws forests and starts for an env: the start is a free cell of the largest component.
-
-    A forest without a free cell is drawn again.
-
-    Args:
-        env: gives size, number of trunks and their radii.
-        batch: leading dimensions.
-        generator: source of randomness.
-
-    Returns:
-        occupied cells, bool ``[*batch, h, h]``, and starts, int64 ``[*batch, 2]``.
-
-    Raises:
-        ValueError: if no forest with a free cell turns up.
-    """
-    draw = partial(F.sample_trees, size=env.size, n_trees=env.n_trees, tree_radius=env.tree_radius)
-    trees = draw(batch, generator=generator)
-    for _ in range(_ATTEMPTS):
-        full = trees.flatten(-2).all(-1)
-        if not full.any():
-            start = F.sample_position(kernels.largest_component(~trees), generator)
-            return trees, start
-        trees = torch.where(full[..., None, None], draw(batch, generator=generator), trees)
-    raise ValueError(
-        f"n_trees={env.n_trees} of radius {list(env.tree_radius)} leaves no free cell in an arena "
-        f"of size={env.size}: take fewer or thinner trees or a larger arena"
-    )
+        seed = secrets.randbits(63) if seed is None else seed
+        self.rng = torch.Generator(device=self.device).manual_seed(seed)
 
 
 def _check(name: str, value: object, allowed: bool, meaning: str) -> None:
@@ -230,12 +203,12 @@ def _check(name: str, value: object, allowed: bool, meaning: str) -> None:
         raise ValueError(f"{name}={value} is not allowed: it must be {meaning}")
 
 
-def _check_world(trees: Tensor, position: Tensor | None, shape: tuple[int, ...]) -> None:
-    """Refuses a world given to ``reset`` that does not fit the env."""
-    if tuple(trees.shape) != shape or trees.dtype != torch.bool:
+def _check_arenas(trees: Tensor, position: Tensor | None, shape: tuple[int, ...]) -> None:
+    """Refuses arenas and starts that do not fit the env."""
+    if tuple(trees.shape) != tuple(shape) or trees.dtype != torch.bool:
         raise ValueError(
             f'("arena", "trees") has shape {tuple(trees.shape)} and dtype {trees.dtype}: '
-            f"this env takes {shape} and torch.bool"
+            f"this env takes {tuple(shape)} and torch.bool"
         )
     if trees.flatten(-2).all(-1).any():
         raise ValueError('("arena", "trees") leaves no free cell in some arena')

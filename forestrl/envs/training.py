@@ -22,28 +22,34 @@ class StaggeredEpisodes(Transform):
 
     Args:
         steps: length of a training episode.
-        seed: seed of the first horizons.
+
+    The first horizons follow from the env's seed.
 
     Raises:
         ValueError: if ``steps`` is less than 1.
     """
 
-    def __init__(self, steps: int = 500, seed: int = 0) -> None:
+    def __init__(self, steps: int = 500) -> None:
         if steps < 1:
             raise ValueError(f"episode_steps={steps} is not allowed: at least 1 is needed")
         super().__init__(in_keys=[K.STEP_COUNT], out_keys=[_HORIZON])
         self.steps = steps
-        self.rng = torch.Generator().manual_seed(seed)
 
     def _reset(
         self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
     ) -> TensorDictBase:
         horizon = torch.full_like(tensordict_reset[K.STEP_COUNT], self.steps)
         if tensordict is None or "_reset" not in tensordict.keys():
-            first = torch.randint(1, self.steps + 1, horizon.shape, generator=self.rng)
-            horizon = first.to(horizon.device)
+            horizon = self._first(horizon.shape).to(horizon.device)
         tensordict_reset[_HORIZON] = horizon
         return tensordict_reset
+
+    def _first(self, shape: torch.Size) -> torch.Tensor:
+        """Draws the first horizons: a function of the env's seed alone, without a state."""
+        source = self.container.base_env.rng
+        source = source[0] if isinstance(source, list) else source  # of several envs side by side
+        generator = torch.Generator().manual_seed(source.initial_seed())
+        return torch.randint(1, self.steps + 1, shape, generator=generator)
 
     def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         horizon = tensordict[_HORIZON]

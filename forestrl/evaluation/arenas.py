@@ -11,7 +11,6 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from forestrl import keys as K
-from forestrl.envs import sample_arena
 
 
 def arena_generator(seed: int, index: int, stream: str) -> torch.Generator:
@@ -37,15 +36,16 @@ def draw_arenas(env: EnvBase, seed: int, indices: Sequence[int]) -> TensorDict:
     """Draws test arenas as ``env.reset`` takes them.
 
     Args:
-        env: a forest, transformed or not; gives size, number of trunks, their radii and the device.
+        env: a forest, transformed or not; gives the world and the device.
         seed: seed of the whole evaluation.
         indices: numbers of the arenas, ``n`` of them.
 
     Returns:
-        ``("arena", "trees")`` bool ``[n, h, h]`` and ``("agent", "position")`` int64 ``[n, 2]``.
+        ``("arena", "trees")`` bool ``[n, H, W]`` and ``("agent", "position")`` int64 ``[n, 2]``.
     """
     forest = getattr(env, "base_env", env)
-    worlds = [sample_arena(forest, generator=arena_generator(seed, i, "arena")) for i in indices]
+    sample = forest.world.sample
+    worlds = [sample((), generator=arena_generator(seed, i, "arena")) for i in indices]
     trees, position = (torch.stack(parts) for parts in zip(*worlds, strict=True))
     arenas = TensorDict({K.TREES: trees, K.POSITION: position}, batch_size=[len(worlds)])
     return arenas.to(forest.device)

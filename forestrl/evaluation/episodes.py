@@ -185,7 +185,7 @@ def _run(
 ) -> Episodes:
     """Runs all arenas of one env at once."""
     draws = uniforms(seed, indices, steps).to(env.device).T.contiguous()  # (steps, n)
-    td = env.reset(draw_arenas(env, seed, indices))
+    td = env.reset(draw_arenas(env, seed, indices), set_state=True)
     record = _Record(td, steps)
     for step in range(steps):
         td = policy(td.set(K.UNIFORM, draws[step]))

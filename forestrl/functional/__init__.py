@@ -6,6 +6,7 @@ All functions take leading batch dimensions ``*B``, including none, and import o
 from forestrl.functional.actions import (
     DISPLACEMENTS,
     NULL_ACTION,
+    check_action,
     feasible,
     move,
     safe_action,
@@ -44,6 +45,7 @@ __all__ = [
     "Cell",
     "Graph",
     "SightLines",
+    "check_action",
     "component",
     "coverage",
     "distance",

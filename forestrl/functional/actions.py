@@ -99,3 +99,18 @@ def sample_action(weight: Tensor, uniform: Tensor) -> Tensor:
     cumulative = weight.double().cumsum(-1)
     below = cumulative <= uniform.double().unsqueeze(-1) * cumulative[..., -1:]
     return below.sum(-1)
+
+
+def check_action(action: Tensor) -> None:
+    """Refuses actions that Table I does not list.
+
+    Args:
+        action: int64 ``[*B]``.
+
+    Raises:
+        ValueError: naming the first of them.
+    """
+    wrong = (action < 0) | (action >= len(DISPLACEMENTS))
+    if wrong.any():
+        first = int(action[wrong].flatten()[0])
+        raise ValueError(f"action={first} is not allowed: it must be 0 to {len(DISPLACEMENTS) - 1}")

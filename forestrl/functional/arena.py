@@ -14,51 +14,53 @@ from forestrl.functional.grid import Cell, inside
 def sample_trees(
     batch: Sequence[int],
     *,
-    size: int,
+    shape: tuple[int, int],
     n_trees: int,
     tree_radius: tuple[float, float],
     generator: torch.Generator,
 ) -> Tensor:
-    """Samples forests: trunk centres uniform in ``[0, h)^2``, radii uniform in ``r_t``.
+    """Samples forests: trunk centres uniform in the arena, radii uniform in ``r_t``.
 
     Args:
         batch: leading dimensions ``*B``.
-        size: arena side ``h``, cells.
+        shape: rows and columns of the arena, cells; the paper's are both ``h``.
         n_trees: number of trunks ``n_t``; trunks may overlap.
         tree_radius: smallest and largest radius ``r_t``, cells.
         generator: source of randomness; its device is the result's.
 
     Returns:
-        occupied cells, bool ``[*batch, h, h]``.
+        occupied cells, bool ``[*batch, H, W]``.
     """
     draws = torch.rand(*batch, n_trees, 3, generator=generator, device=generator.device)
     low, high = tree_radius
-    return rasterize(draws[..., :2] * size, low + (high - low) * draws[..., 2], size=size)
+    centre = draws[..., :2] * torch.tensor(shape, device=generator.device)
+    return rasterize(centre, low + (high - low) * draws[..., 2], shape=shape)
 
 
-def rasterize(centre: Tensor, radius: Tensor, *, size: int) -> Tensor:
+def rasterize(centre: Tensor, radius: Tensor, *, shape: tuple[int, int]) -> Tensor:
     """Marks the cells whose centre lies within a trunk, its rim included.
 
     Args:
         centre: trunk centres, float ``[*B, n, 2]``, in cells; cell (i, j) spans [i, i+1).
         radius: float ``[*B, n]``, in cells.
-        size: arena side ``h``, cells.
+        shape: rows and columns of the arena, cells.
 
     Returns:
-        bool ``[*B, h, h]``.
+        bool ``[*B, H, W]``.
     """
-    occupied = torch.zeros(*radius.shape[:-1], size * size, dtype=torch.uint8, device=radius.device)
+    area, width = shape[0] * shape[1], shape[1]
+    occupied = torch.zeros(*radius.shape[:-1], area, dtype=torch.uint8, device=radius.device)
     if radius.numel() == 0:
-        return occupied.bool().unflatten(-1, (size, size))
+        return occupied.bool().unflatten(-1, shape)
     reach = math.ceil(float(radius.max()) + 0.5)
     span = torch.arange(-reach, reach + 1, device=radius.device)
     patch = torch.cartesian_prod(span, span)  # (P, 2), the cells a trunk can touch
     index = centre.floor().long().unsqueeze(-2) + patch  # (*B, n, P, 2)
     distance = (index + 0.5 - centre.unsqueeze(-2)).square().sum(-1).sqrt()
-    hit = (distance <= radius.unsqueeze(-1)) & inside(index, (size, size))
-    flat = (index[..., 0] * size + index[..., 1]).clamp(0, size * size - 1)
+    hit = (distance <= radius.unsqueeze(-1)) & inside(index, shape)
+    flat = (index[..., 0] * width + index[..., 1]).clamp(0, area - 1)
     occupied.scatter_reduce_(-1, flat.flatten(-2), hit.flatten(-2).to(torch.uint8), "amax")
-    return occupied.bool().unflatten(-1, (size, size))
+    return occupied.bool().unflatten(-1, shape)
 
 
 def dilate(mask: Tensor) -> Tensor:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import torch
 from tensordict import TensorDictBase
+from torchrl.envs.transforms import Transform
 
 from forestrl import functional as F
 from forestrl import keys as K
@@ -11,7 +14,7 @@ from forestrl import keys as K
 _LEVELS = (80, 90, 98)
 
 
-def summarize(batch: TensorDictBase) -> dict[str, float]:
+def summarize(batch: TensorDictBase, transforms: Iterable[Transform] = ()) -> dict[str, float]:
     """Measures a batch of experience.
 
     Values over episodes are taken from the episodes that end, and the levels that are crossed, in
@@ -19,11 +22,20 @@ def summarize(batch: TensorDictBase) -> dict[str, float]:
 
     Args:
         batch: what a collector returns, ``[*B, T]`` frames.
+        transforms: those of the env. One with a method ``metrics(batch)``, a dictionary of scalars
+            by name, is asked for what it knows best: a reward for its terms, an observation for its
+            size.
 
     Returns:
-        ``rollout/*``, ``safety/*``, ``reward/*`` and ``graph/*``.
+        ``rollout/*``, ``safety/*``, ``reward/*`` and what the transforms measure.
     """
-    return rollout(batch) | safety(batch) | reward_terms(batch) | graph(batch)
+    metrics = rollout(batch) | safety(batch)
+    for transform in transforms:
+        if (measure := getattr(transform, "metrics", None)) is not None:
+            metrics |= measure(batch)
+    if not any(name.startswith("reward/") for name in metrics):
+        metrics["reward/mean"] = _mean(batch["next", "reward"])
+    return metrics
 
 
 def rollout(batch: TensorDictBase) -> dict[str, float]:
@@ -44,43 +56,14 @@ def rollout(batch: TensorDictBase) -> dict[str, float]:
 
 
 def safety(batch: TensorDictBase) -> dict[str, float]:
-    """Measures the filter: shares of replaced and of null actions, and collisions (must be 0)."""
+    """Measures what was done: shares of replaced and of null actions, collisions (must be 0)."""
     after = batch["next"]
     executed = after.get(K.EXECUTED, batch[K.ACTION])
     return {
-        "safety/intervention_rate": _mean(_unsafe(batch)),
+        "safety/intervention_rate": 0.0,  # without a filter; the filter measures its own
         "safety/null_actions": _mean(executed == F.NULL_ACTION),
         "safety/collisions": float(after[K.COLLISION].sum()),
     }
-
-
-def reward_terms(batch: TensorDictBase) -> dict[str, float]:
-    """Splits the mean reward a step into its terms (Eq. 6); they add up to it."""
-    after = batch["next"]
-    unsafe = _unsafe(batch) | after[K.COLLISION]
-    explored = after["terminated"] & ~unsafe
-    shaped = (~unsafe & ~explored).float()
-    new_cells = after[K.NEW_CELLS] * shaped
-    return {
-        "reward/new_cells": _mean(new_cells),
-        "reward/potential": _mean(after["reward"] * shaped - new_cells),
-        "reward/explored": _mean(after["reward"] * explored),
-        "reward/unsafe": _mean(after["reward"] * unsafe),
-    }
-
-
-def graph(batch: TensorDictBase) -> dict[str, float]:
-    """Measures the graphs: frontier cells, and the share of graphs that had no room for all."""
-    frontiers = batch[K.FRONTIERS]
-    return {
-        "graph/frontiers": _mean(frontiers),
-        "graph/truncated": _mean(frontiers > batch[K.WAYPOINT].shape[-1]),
-    }
-
-
-def _unsafe(batch: TensorDictBase) -> torch.Tensor:
-    after = batch["next"]
-    return after.get(K.INTERVENED, torch.zeros_like(after[K.COLLISION]))
 
 
 def _mean(value: torch.Tensor) -> float:

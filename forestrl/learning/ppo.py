@@ -6,13 +6,10 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
-from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDictReplayBuffer
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
-from forestrl import keys as K
-
-_LEARNT_FROM = (*K.GRAPH, "action", "action_log_prob", "advantage", "value_target", "state_value")
+_TARGETS = ("action", "action_log_prob", "advantage", "value_target", "state_value")
 
 
 class PPO:
@@ -23,8 +20,8 @@ class PPO:
     state.
 
     Args:
-        actor: writes ``"action"`` and ``"action_log_prob"``.
-        critic: writes ``"state_value"``.
+        actor: writes ``"action"`` and ``"action_log_prob"``; reads its ``in_keys``.
+        critic: writes ``"state_value"``; reads its ``in_keys``.
         frames_per_batch: frames an update learns from, counted over all arenas ("rollouts").
         num_minibatches: minibatches an epoch.
         num_epochs: passes over a batch.
@@ -96,11 +93,7 @@ class PPO:
         self.parameters = [*actor.parameters(), *critic.parameters()]
         self.optimizer = torch.optim.Adam(self.parameters, lr=lr, fused=True)
         self.minibatch_size = frames_per_batch // num_minibatches
-        self.shuffled = TensorDictReplayBuffer(  # a sample is the whole batch in another order
-            storage=LazyTensorStorage(frames_per_batch),
-            sampler=SamplerWithoutReplacement(),
-            batch_size=frames_per_batch,
-        )
+        self.learns_from = list(dict.fromkeys((*actor.in_keys, *critic.in_keys, *_TARGETS)))
 
     def update(self, batch: TensorDictBase) -> dict[str, float]:
         """Learns from one batch of experience.
@@ -112,11 +105,11 @@ class PPO:
             the mean over all minibatches of each part of the loss and of its diagnostics.
         """
         self.estimate_advantage(batch)
-        self.fill(batch)
-        measured = []
-        for _ in range(self.num_epochs):
-            for minibatch in self.shuffled.sample().split(self.minibatch_size):
-                measured.append(self.step(minibatch))
+        frames = batch.select(*self.learns_from).reshape(-1)
+        # One order too many is drawn: it is what earlier runs with the same seed did.
+        *orders, _ = [torch.randperm(len(frames)) for _ in range(self.num_epochs + 1)]
+        minibatches = (each for o in orders for each in frames[o].split(self.minibatch_size))
+        measured = [self.step(minibatch) for minibatch in minibatches]
         means = torch.stack(measured).mean(0).tolist()
         metrics = dict(zip(_MEASURED.values(), means, strict=True))
         return metrics | {"ppo/explained_variance": explained_variance(batch)}
@@ -134,17 +127,12 @@ class PPO:
         )
         ends = batch["next", "done"].squeeze(-1).clone()
         ends[..., -1] = True
-        next_value[ends] = self._value(batch["next"].select(*K.GRAPH)[ends])
+        next_value[ends] = self._value(batch["next"].select(*self.critic.in_keys)[ends])
         batch["state_value"], batch["next", "state_value"] = value, next_value
         self.advantage(batch)
 
     def _value(self, states: TensorDictBase) -> Tensor:
-        return self.critic(states.select(*K.GRAPH))["state_value"]
-
-    def fill(self, batch: TensorDictBase) -> None:
-        """Makes a batch with advantages the one that is shuffled."""
-        self.shuffled.empty()
-        self.shuffled.extend(batch.select(*_LEARNT_FROM).reshape(-1))
+        return self.critic(states.select(*self.critic.in_keys))["state_value"]
 
     def step(self, minibatch: TensorDictBase) -> Tensor:
         """Takes one Adam step; returns what ``_MEASURED`` lists, float32 ``[n]``."""

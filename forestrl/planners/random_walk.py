@@ -8,12 +8,13 @@ from tensordict.nn import TensorDictModuleBase
 
 from forestrl import functional as F
 from forestrl import keys as K
+from forestrl.sampling import uniform
 
 
 class RandomWalk(TensorDictModuleBase):
     """Draws every action uniformly.
 
-    Reads ``"uniform"``, the draw, and the agent's map; writes ``"action"``.
+    Reads the agent's map and, if there is one, the draw under ``"uniform"``; writes ``"action"``.
 
     Args:
         feasible_only: draw among the feasible moves (staying in place if there is none) instead of
@@ -21,7 +22,7 @@ class RandomWalk(TensorDictModuleBase):
     """
 
     def __init__(self, feasible_only: bool = True) -> None:
-        self.in_keys = [K.CELLS, K.POSITION, K.UNIFORM]
+        self.in_keys = [K.CELLS, K.POSITION]
         self.out_keys = [K.ACTION]
         super().__init__()
         self.feasible_only = feasible_only
@@ -33,4 +34,4 @@ class RandomWalk(TensorDictModuleBase):
             weight[..., F.NULL_ACTION] = weight[..., 1:].sum(-1) == 0
         else:
             weight = torch.ones_like(weight)
-        return tensordict.set(K.ACTION, F.sample_action(weight, tensordict[K.UNIFORM]))
+        return tensordict.set(K.ACTION, F.sample_action(weight, uniform(tensordict)))

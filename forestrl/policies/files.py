@@ -1,31 +1,38 @@
-"""Policy files: the weights of both networks with what is needed to build them, and no pickle.
+"""Policy files: weights with what is needed to build their networks again, and no pickle.
 
-A policy file is a safetensors file; its header holds the architecture, the observation it reads
-and how it was trained, as JSON.
+A policy file is a safetensors file. Its header names the model and the observation it reads, with
+their settings, and how it was trained, as JSON with a checksum of all. Names are looked up in a
+closed list; nothing that a file says is ever imported. Equal policies have equal bytes.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
+from torch import Tensor
 
-from forestrl.policies.actor_critic import ActorCritic, Kernel
+from forestrl.policies.actor_critic import ActorCritic, LearnedPolicy
+from forestrl.policies.gatv2 import GATv2ActorCritic
 from forestrl.storage import atomic_write
 
-FORMAT = "forestrl-policy-1"
-ASSETS = Path(__file__).parent / "assets"
-RELEASED = ASSETS / "paper.safetensors"
+FORMAT = 2
+"""Files of format 1 are read too."""
+MODELS: Mapping[str, Callable[..., ActorCritic]] = {"gatv2": GATv2ActorCritic}
+"""The models that a policy file may name."""
+RELEASED = Path(__file__).parent / "assets" / "paper.safetensors"
 """The released policy, used where no checkpoint is given."""
-
 POLICY_FILE = "policy.safetensors"
-_WHERE_SILENT = {"edge_lengths": True}  # what older files do not say
+
+_KEY, _OLD_FORMAT = "forestrl", "forestrl-policy-1"
 _IN_A_RUN = ("checkpoints/best", "checkpoints/latest", "")
 
 
@@ -34,50 +41,78 @@ class CheckpointError(ValueError):
 
 
 @dataclass(frozen=True)
+class Described:
+    """What can be built again: its name in a closed list, and its settings by argument."""
+
+    name: str
+    settings: dict[str, Any]
+
+
+@dataclass(frozen=True)
 class Policy:
     """A policy file in memory.
 
     Attributes:
-        model: keyword arguments of :class:`ActorCritic`, ``kernel`` left out.
-        window: ``k``, the side of the local window its observation was made with.
-        training: how it was trained: frames, seed and what else the writer wrote down.
+        model: the networks.
+        observation: what they read.
+        training: how they were trained: frames, seed, world and what else the writer wrote down.
         weights: the state dict of the :class:`ActorCritic`.
+        source: what to call the policy in a message.
     """
 
-    model: dict[str, Any]
-    window: int
+    model: Described
+    observation: Described
     training: dict[str, Any]
-    weights: dict[str, torch.Tensor]
+    weights: dict[str, Tensor] = field(repr=False)
+    source: str = "this policy"
 
-    def build(self, kernel: Kernel = "fused", lidar_range: float | None = None) -> ActorCritic:
-        """Builds the networks with these weights.
+    def build(
+        self, models: Mapping[str, Callable[..., ActorCritic]] = MODELS, **settings: Any
+    ) -> ActorCritic:
+        """Builds the networks with these weights, without gradients.
 
         Args:
-            kernel: what computes them.
-            lidar_range: ``l``, the unit of edge lengths, cells; by default that of the training.
+            models: the models that may be built, by name.
+            settings: of the model, in place of the file's own.
 
         Raises:
-            CheckpointError: if they do not fit the model.
+            CheckpointError: if the model is not one of them, or the weights do not fit it.
         """
-        unit = {} if lidar_range is None else {"lidar_range": lidar_range}
-        networks = ActorCritic(**{**self.model, **unit}, kernel=kernel)
+        if self.model.name not in models:
+            known = ", ".join(sorted(models))
+            raise CheckpointError(
+                f"{self.source} is of the model {self.model.name!r}, which is not one of {known}: "
+                "give its configuration with --config-dir and model=, as in its training"
+            )
         try:
+            networks = models[self.model.name](**{**self.model.settings, **settings})
             networks.load_state_dict(self.weights)
-        except RuntimeError as error:
-            raise CheckpointError(f"the policy's weights do not fit its model: {error}") from error
+        except (RuntimeError, TypeError) as error:
+            text = " ".join(str(error).split())
+            raise CheckpointError(f"{self.source} does not fit its model: {text}") from error
         return networks.eval().requires_grad_(False)
+
+
+def policy_bytes(policy: Policy) -> bytes:
+    """Gives the policy file's content.
+
+    Raises:
+        TypeError: if a setting is nothing that JSON can hold.
+    """
+    weights = {name: value.detach().contiguous().cpu() for name, value in policy.weights.items()}
+    about = {
+        "format": FORMAT,
+        "model": vars(policy.model),
+        "observation": vars(policy.observation),
+        "training": policy.training,
+    }
+    about["sha256"] = _checksum(about, weights)
+    return save(weights, metadata={_KEY: json.dumps(about, sort_keys=True)})
 
 
 def save_policy(path: Path, policy: Policy) -> None:
     """Writes a policy file, whole or not at all."""
-    header = {
-        "format": FORMAT,
-        "model": json.dumps(policy.model),
-        "window": json.dumps(policy.window),
-        "training": json.dumps(policy.training),
-    }
-    weights = {name: value.detach().contiguous().cpu() for name, value in policy.weights.items()}
-    atomic_write(path, save(weights, metadata=header))
+    atomic_write(path, policy_bytes(policy))
 
 
 def load_policy(path: str | Path) -> Policy:
@@ -90,24 +125,77 @@ def load_policy(path: str | Path) -> Policy:
         CheckpointError: if there is none, or it cannot be read; the message says why.
     """
     path = find_policy(Path(path))
+    if not os.access(path, os.R_OK):
+        raise CheckpointError(f"checkpoint={path} cannot be read: permission denied")
     try:
         with safe_open(path, framework="pt") as file:
             header = file.metadata() or {}
             weights = {name: file.get_tensor(name) for name in file.keys()}
     except (SafetensorError, OSError) as error:
         raise CheckpointError(f"checkpoint={path} cannot be read as a policy: {error}") from error
-    if header.get("format") != FORMAT:
-        raise CheckpointError(
-            f"checkpoint={path} is a safetensors file but not a policy of this program: its "
-            f"format is {header.get('format')!r}, not {FORMAT!r}"
-        )
     try:
-        parts = {name: json.loads(header[name]) for name in ("model", "window", "training")}
-    except (KeyError, json.JSONDecodeError) as error:
+        policy = _described(header, weights, f"checkpoint={path}")
+    except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
         raise CheckpointError(
-            f"checkpoint={path} cannot be read as a policy: its header is damaged: {error}"
+            f"checkpoint={path} cannot be read as a policy: its header is damaged: {error!r}"
         ) from error
-    return Policy(**parts, weights=weights)
+    broken = [name for name, value in weights.items() if not value.isfinite().all()]
+    if broken:
+        raise CheckpointError(f"checkpoint={path} has weights that are not finite: {broken[0]}")
+    return policy
+
+
+def _described(header: Mapping[str, str], weights: dict[str, Tensor], source: str) -> Policy:
+    """Reads a header of either format."""
+    if header.get("format") == _OLD_FORMAT:
+        model, window, training = (json.loads(header[n]) for n in ("model", "window", "training"))
+        observation = Described("exploration_graph", {"window": window})
+        return Policy(Described("gatv2", model), observation, training, weights, source)
+    if _KEY not in header:
+        raise CheckpointError(f"{source} is a safetensors file but not a policy of this program")
+    about = json.loads(header[_KEY])
+    if about["format"] != FORMAT:
+        raise CheckpointError(f"{source} has format {about['format']}, this program reads {FORMAT}")
+    if about.pop("sha256") != _checksum(about, weights):
+        raise CheckpointError(f"{source} is damaged: its checksum is not that of its content")
+    model, observation = (Described(**about[name]) for name in ("model", "observation"))
+    return Policy(model, observation, about["training"], weights, source)
+
+
+def _checksum(about: Mapping[str, Any], weights: Mapping[str, Tensor]) -> str:
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for name in sorted(weights):
+        value = weights[name].contiguous()
+        digest.update(f"{name} {value.dtype} {list(value.shape)}".encode())
+        digest.update(value.view(-1).view(torch.uint8).numpy().tobytes())
+    return digest.hexdigest()
+
+
+def learned_policy(
+    checkpoint: str | Path | None = None,
+    deterministic: bool = False,
+    *,
+    models: Mapping[str, Callable[..., ActorCritic]] = MODELS,
+    settings: Mapping[str, Any] | None = None,
+) -> LearnedPolicy:
+    """Loads a policy for use.
+
+    Args:
+        checkpoint: a policy file or a run folder; None for the released policy.
+        deterministic: take the most probable action instead of a sampled one.
+        models: the models that may be built, by name.
+        settings: of the model, in place of the file's own.
+
+    Returns:
+        the policy; its ``file`` says what it reads and how it was trained.
+
+    Raises:
+        CheckpointError: if there is no such policy, or it cannot be built.
+    """
+    file = load_policy(RELEASED if checkpoint is None else checkpoint)
+    policy = file.build(models, **(settings or {})).make_policy(deterministic)
+    policy.file = file
+    return policy
 
 
 def find_policy(path: Path) -> Path:
@@ -127,21 +215,22 @@ def find_policy(path: Path) -> Path:
     )
 
 
-def require_same(policy: Policy, wanted: Mapping[str, Any], source: str) -> None:
-    """Refuses a policy made for another model.
+def require_same(policy: Policy, wanted: Mapping[str, Any]) -> None:
+    """Refuses a policy made with other settings than those asked for.
 
     Args:
         policy: the policy.
-        wanted: the fields asked for, by name: those of ``Policy.model`` and ``window``.
-        source: how to call the policy in the message.
+        wanted: settings of its model and its observation by name, ``model.hidden`` or
+            ``graph.window``; one that the policy says nothing of is not looked at.
 
     Raises:
-        CheckpointError: naming the first field that differs and both values.
+        CheckpointError: naming the first that differs and both values.
     """
-    made_for = {**_WHERE_SILENT, **policy.model, "window": policy.window}
+    parts = {"model": policy.model, "graph": policy.observation}
     for name, value in wanted.items():
-        if name in made_for and made_for[name] != value:
+        part, _, setting = name.partition(".")
+        made_for = parts[part].settings.get(setting, value)
+        if made_for != value:
             raise CheckpointError(
-                f"checkpoint={source} was made for another model: its {name} is "
-                f"{made_for[name]}, but {name}={value} was asked for"
+                f"{policy.source} was made with {name}={made_for}, but {name}={value} was asked for"
             )

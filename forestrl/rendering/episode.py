@@ -60,7 +60,7 @@ def record_episode(
         the frames.
     """
     draw = partial(draw_frame, scale=scale, lidar_range=lidar_range)
-    td = env.reset(td_reset)
+    td = env.reset(td_reset, set_state=True) if K.TREES in td_reset else env.reset()
     frames: list[Image.Image] = []
     path: list[Cell] = []
     marks: list[Cell] = []

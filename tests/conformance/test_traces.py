@@ -16,7 +16,13 @@ from torchrl.envs.utils import step_mdp
 
 from forestrl import functional as F
 from forestrl import keys as K
-from forestrl.envs import ExplorationGraph, ForestEnv, FrontierPotentialReward, SafetyFilter
+from forestrl.envs import (
+    ExplorationGraph,
+    ForestEnv,
+    FrontierPotentialReward,
+    RandomForest,
+    SafetyFilter,
+)
 from tests import oracles
 from tests.drawing import draw, parse_cells
 from tests.graphs import edges_by_node, features_by_node
@@ -33,16 +39,16 @@ def make_env(trace: dict, num_envs: int | None = None) -> TransformedEnv:
     params = trace["params"]
     lidar_range, goal = params["lidar_range"], params["coverage_goal"]
     window, beta = params["window"], params["beta"]
+    occupancy = trace["occupancy"]
     env = ForestEnv(
-        size=len(trace["occupancy"]),
-        n_trees=0,
+        RandomForest((len(occupancy), len(occupancy[0])), n_trees=0),
         lidar_range=lidar_range,
         coverage_goal=goal,
         max_steps=len(trace["steps"]) + 1,
         num_envs=num_envs,
     )
-    graph = ExplorationGraph(window=window, max_frontiers=MAX_FRONTIERS, lidar_range=lidar_range)
-    reward = FrontierPotentialReward(beta=beta, window=window, coverage_goal=goal)
+    graph = ExplorationGraph(window=window, max_frontiers=MAX_FRONTIERS)
+    reward = FrontierPotentialReward(beta=beta)
     return TransformedEnv(env, Compose(SafetyFilter(), graph, reward))
 
 
@@ -51,7 +57,7 @@ def start(env: TransformedEnv, trace: dict):
     td = env.fake_tensordict().select(K.TREES, K.POSITION)
     td[K.TREES] = trees_of(trace).expand_as(td[K.TREES]).clone()
     td[K.POSITION] = torch.tensor(trace["start"]).expand_as(td[K.POSITION]).clone()
-    return env.reset(td)
+    return env.reset(td, set_state=True)
 
 
 def play(env: TransformedEnv, trace: dict):

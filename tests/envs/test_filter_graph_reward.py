@@ -94,7 +94,7 @@ def test_a_reset_reports_no_intervention():
     for _ in range(3):
         td = step_mdp(env.step(env.rand_action(td)))
     td["_reset"] = torch.tensor([[True], [False], [True]])
-    td = env.reset(td)
+    td = env.reset(td, set_state=False)
     assert td[K.EXECUTED][[0, 2]].tolist() == [0, 0]
     assert not td[K.INTERVENED][[0, 2]].any()
 
@@ -121,7 +121,7 @@ def test_the_first_observation_does_not_depend_on_trees_out_of_sight(seed):
     noise = torch.rand(near.shape, generator=torch.Generator().manual_seed(seed)) < 0.3
     others = torch.where(near, td[K.TREES], noise)
     assert not torch.equal(others, td[K.TREES])
-    again = env.reset(given_world(env, others, td[K.POSITION]))
+    again = env.reset(given_world(env, others, td[K.POSITION]), set_state=True)
     for key in BELIEF:
         assert torch.equal(td[key], again[key]), key
 

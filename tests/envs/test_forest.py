@@ -41,15 +41,14 @@ FLAGS = dict.fromkeys(["done", "terminated", "truncated"], ((1,), torch.bool))
 def test_table_3_gives_the_defaults():
     parameters = inspect.signature(ForestEnv.__init__).parameters
     expected = {
-        "size": 50,
-        "n_trees": 45,
-        "tree_radius": (1.0, 3.0),
         "lidar_range": 5.0,
         "coverage_goal": 0.98,
         "max_steps": 2500,
         "num_envs": None,
     }
     assert {name: parameters[name].default for name in expected} == expected
+    world = ForestEnv().world
+    assert (world.shape, world.n_trees, world.tree_radius) == ((50, 50), 45, (1.0, 3.0))
 
 
 @pytest.mark.parametrize(("num_envs", "batch"), BATCHES)
@@ -84,9 +83,6 @@ def test_the_constants_of_the_schema_are_its_keys():
 @pytest.mark.parametrize(
     ("option", "value"),
     [
-        ("size", 0),
-        ("n_trees", -1),
-        ("tree_radius", (3.0, 1.0)),
         ("lidar_range", 0.0),
         ("coverage_goal", 1.5),
         ("coverage_goal", 0.0),
@@ -135,7 +131,7 @@ def test_a_reset_takes_a_given_world_for_each_arena():
     env = make_forest(num_envs=2, size=4, n_trees=0)
     trees = torch.stack([world(CORRIDOR)[0], world(CORRIDOR)[0].T])
     position = torch.tensor([[0, 3], [3, 0]])
-    td = env.reset(given(env, trees, position))
+    td = env.reset(given(env, trees, position), set_state=True)
     assert torch.equal(td[K.TREES], trees) and torch.equal(td[K.POSITION], position)
 
 
@@ -147,7 +143,7 @@ def test_a_reset_draws_the_start_in_a_given_world_from_its_largest_component():
         . T T .
     """)
     env = make_forest(num_envs=60, size=4, n_trees=0)
-    td = env.reset(given(env, trees.expand(60, 4, 4)))
+    td = env.reset(given(env, trees.expand(60, 4, 4)), set_state=True)
     starts = {tuple(position) for position in td[K.POSITION].tolist()}
     assert starts <= {(0, 2), (0, 3), (1, 2), (1, 3), (2, 0), (2, 1), (2, 2), (3, 0), (3, 3)}
     assert len(starts) > 4
@@ -242,7 +238,7 @@ def test_coverage_is_met_exactly_by_the_share_known(seed):
 def test_given_worlds_do_not_share_memory_with_the_state():
     trees, position = world(CORRIDOR)
     env = make_forest(size=4, n_trees=0)
-    td = env.reset(given(env, trees, position))
+    td = env.reset(given(env, trees, position), set_state=True)
     before = td.clone()
     env.rollout(5, auto_reset=False, tensordict=td.clone(), break_when_any_done=False)
     assert_same_state(td, before)

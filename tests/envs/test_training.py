@@ -2,7 +2,7 @@
 
 import pytest
 import torch
-from torchrl.envs import TransformedEnv, check_env_specs
+from torchrl.envs import SerialEnv, TransformedEnv, check_env_specs
 
 from forestrl import keys as K
 from forestrl.envs import StaggeredEpisodes
@@ -13,8 +13,8 @@ ARENAS, STEPS = 8, 6
 
 def make_env(seed=0, **options):
     """An env whose agents stay where they are: nothing but time ends an episode."""
-    env = make_forest(num_envs=ARENAS, **options)
-    return TransformedEnv(env, StaggeredEpisodes(STEPS, seed=seed))
+    env = make_forest(num_envs=ARENAS, seed=seed, **options)
+    return TransformedEnv(env, StaggeredEpisodes(STEPS))
 
 
 def stay(td):
@@ -39,6 +39,24 @@ def test_first_episodes_are_staggered_and_later_ones_full():
 def test_first_horizons_depend_on_the_seed_alone():
     assert lengths(make_env(seed=1)) == lengths(make_env(seed=1))
     assert lengths(make_env(seed=1)) != lengths(make_env(seed=2))
+
+
+def test_first_horizons_follow_a_seed_that_is_set_later():
+    env, other = make_env(seed=1), make_env(seed=2)
+    env.reset()
+    env.set_seed(2)
+    assert env.reset()["horizon"].equal(other.reset()["horizon"])
+    env.set_seed(2)
+    assert env.reset()["horizon"].equal(other.reset()["horizon"])
+
+
+def test_episodes_are_staggered_outside_several_envs_too():
+    def make():
+        return make_forest(num_envs=2)
+
+    env = TransformedEnv(SerialEnv(3, make), StaggeredEpisodes(50))
+    assert len(env.reset()["horizon"].unique()) > 2
+    env.close()
 
 
 def test_the_cut_is_a_truncation():

@@ -71,7 +71,7 @@ def check_values(name: str, steps) -> None:
             assert torch.equal(state[K.FEASIBLE], F.feasible(cells, position))
         if name in ("graph", "paper"):
             graph = F.exploration_graph(
-                cells, position, window=7, max_frontiers=MAX_FRONTIERS, lidar_range=5.0
+                cells, position, window=7, max_frontiers=MAX_FRONTIERS, lidar_range=2.5
             )
             for key, expected in zip(WRITES["graph"], graph, strict=True):
                 torch.testing.assert_close(state[key], expected, rtol=0, atol=1e-6)

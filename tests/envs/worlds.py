@@ -10,7 +10,13 @@ from torch import Tensor
 from torchrl.envs import Compose, EnvBase, Transform, TransformedEnv
 
 from forestrl import keys as K
-from forestrl.envs import ExplorationGraph, ForestEnv, FrontierPotentialReward, SafetyFilter
+from forestrl.envs import (
+    ExplorationGraph,
+    ForestEnv,
+    FrontierPotentialReward,
+    RandomForest,
+    SafetyFilter,
+)
 from tests.drawing import world
 
 SIZE = 9
@@ -25,7 +31,18 @@ CORRIDOR = """
 
 def make_forest(**options: Any) -> ForestEnv:
     """A small forest with thin trunks."""
-    return ForestEnv(**{"size": SIZE, "n_trees": 8, "tree_radius": (0.5, 1.0)} | options)
+    return forest_env(**{"size": SIZE, "n_trees": 8, "tree_radius": (0.5, 1.0)} | options)
+
+
+def forest_env(
+    size: int | tuple[int, int] = 50,
+    n_trees: int = 45,
+    tree_radius: tuple[float, float] = (1.0, 3.0),
+    **options: Any,
+) -> ForestEnv:
+    """A forest of any size; the same one every time unless a seed is given."""
+    world = RandomForest(size, n_trees, tree_radius)
+    return ForestEnv(world, **{"seed": 0} | options)
 
 
 def paper_transforms(**options: Any) -> list[Transform]:
@@ -41,10 +58,10 @@ def make_transformed(**options: Any) -> TransformedEnv:
 def env_for(drawing: str, *transforms: Transform, **options: Any) -> tuple[EnvBase, TensorDictBase]:
     """An env of the drawing's size with the first state of an episode in the drawn world."""
     trees, position = world(drawing)
-    env: EnvBase = ForestEnv(**{"size": len(trees), "n_trees": 0} | options)
+    env: EnvBase = forest_env(**{"size": tuple(trees.shape), "n_trees": 0} | options)
     if transforms:
         env = TransformedEnv(env, Compose(*transforms))
-    return env, env.reset(given(env, trees, position))
+    return env, env.reset(given(env, trees, position), set_state=True)
 
 
 def given(env: EnvBase, trees: Tensor, position: Tensor | None = None) -> TensorDictBase:

@@ -4,19 +4,20 @@ import torch
 from torchrl.envs import Compose, TransformedEnv
 
 from forestrl import keys as K
-from forestrl.envs import ExplorationGraph, ForestEnv, SafetyFilter
+from forestrl.envs import ExplorationGraph, SafetyFilter
+from tests.envs.worlds import forest_env
 
 
 def forest(n, *, size=16, n_trees=6, graph=True, max_frontiers=64, **options):
     """A forest of ``n`` arenas with the filter and, if asked for, the graph."""
     transforms = [SafetyFilter()] + [ExplorationGraph(max_frontiers=max_frontiers)] * graph
-    env = ForestEnv(size=size, n_trees=n_trees, num_envs=n, **options)
+    env = forest_env(size=size, n_trees=n_trees, num_envs=n, **options)
     return TransformedEnv(env, Compose(*transforms))
 
 
 def meadow(n):
     """A bare env without trees: what happens in it can be worked out by hand."""
-    return TransformedEnv(ForestEnv(size=9, n_trees=0, num_envs=n))
+    return TransformedEnv(forest_env(size=9, n_trees=0, num_envs=n))
 
 
 def random_action(td):

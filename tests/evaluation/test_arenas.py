@@ -63,7 +63,7 @@ def test_starts_are_in_the_largest_component():
 def test_env_resets_to_the_arenas():
     env = forest(5)
     drawn = arenas.draw_arenas(env, 0, range(5))
-    state = env.reset(drawn.clone())
+    state = env.reset(drawn.clone(), set_state=True)
     assert torch.equal(state[K.TREES], drawn[K.TREES])
     assert torch.equal(state[K.POSITION], drawn[K.POSITION])
 

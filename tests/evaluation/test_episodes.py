@@ -9,10 +9,11 @@ import torch
 from torchrl.envs import TransformedEnv
 
 from forestrl import keys as K
-from forestrl.envs import ExplorationGraph, ForestEnv
+from forestrl.envs import ExplorationGraph
 from forestrl.evaluation import Episodes, evaluate, uniforms
 from forestrl.evaluation.arenas import draw_arenas as arenas_of
 from forestrl.planners import CostBased, NearestFrontier
+from tests.envs.worlds import forest_env
 from tests.evaluation.policies import always, forest, meadow, random_action, random_logits
 
 SIDE = 9  # of the meadow
@@ -136,7 +137,7 @@ def test_there_may_be_no_graph():
 
 def test_there_may_be_a_graph_and_no_filter():
     def factory(n):
-        return TransformedEnv(ForestEnv(size=SIDE, num_envs=n, n_trees=1), ExplorationGraph())
+        return TransformedEnv(forest_env(size=SIDE, num_envs=n, n_trees=1), ExplorationGraph())
 
     assert not run(factory, random_action).intervened.any()
 

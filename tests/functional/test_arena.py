@@ -26,8 +26,9 @@ from tests.states import (
 
 
 def sample(batch=(), *, size=12, n_trees=4, tree_radius=(1.0, 3.0), seed=0):
+    shape = (size, size) if isinstance(size, int) else size
     return F.sample_trees(
-        batch, size=size, n_trees=n_trees, tree_radius=tree_radius, generator=seeded(seed)
+        batch, shape=shape, n_trees=n_trees, tree_radius=tree_radius, generator=seeded(seed)
     )
 
 
@@ -72,21 +73,23 @@ def test_trunks_of_one_cell_radius_always_occupy_the_cell_they_stand_in():
 
 def test_a_trunk_occupies_the_cells_whose_centre_lies_within_its_radius():
     """The centre of (2, 2) is (2.5, 2.5); its four neighbours' centres lie on the rim, at 1."""
-    arena = F.rasterize(torch.tensor([[2.5, 2.5]]), torch.tensor([1.0]), size=5)
+    arena = F.rasterize(torch.tensor([[2.5, 2.5]]), torch.tensor([1.0]), shape=(5, 5))
     assert cells_of(arena) == {(2, 2), (1, 2), (3, 2), (2, 1), (2, 3)}
     # From (3.0, 1.0) the centres of four cells are sqrt(1/2) = 0.707 away, the next sqrt(5/2).
-    arena = F.rasterize(torch.tensor([[3.0, 1.0]]), torch.tensor([0.75]), size=5)
+    arena = F.rasterize(torch.tensor([[3.0, 1.0]]), torch.tensor([0.75]), shape=(5, 5))
     assert cells_of(arena) == {(2, 0), (2, 1), (3, 0), (3, 1)}
 
 
 def test_a_trunk_at_the_border_is_cut_by_it_and_does_not_wrap_around():
-    arena = F.rasterize(torch.tensor([[0.0, 4.9]]), torch.tensor([1.5]), size=5)
+    arena = F.rasterize(torch.tensor([[0.0, 4.9]]), torch.tensor([1.5]), shape=(5, 5))
     # (0, 4) at hypot(0.5, 0.4), (1, 4) at hypot(1.5, 0.4) > 1.5, (0, 3) at hypot(0.5, 1.4) = 1.487
     assert cells_of(arena) == {(0, 4), (0, 3)}
 
 
 def test_trunks_may_overlap():
-    arena = F.rasterize(torch.tensor([[0.5, 0.5], [0.5, 1.0]]), torch.tensor([0.5, 0.5]), size=2)
+    arena = F.rasterize(
+        torch.tensor([[0.5, 0.5], [0.5, 1.0]]), torch.tensor([0.5, 0.5]), shape=(2, 2)
+    )
     assert cells_of(arena) == {(0, 0), (0, 1)}
 
 
@@ -115,6 +118,17 @@ def test_trunks_have_uniform_centres_and_uniform_radii():
     error = (expected * (1 - expected) / arenas).sqrt()
     assert ((share - expected).abs() < 5 * error).all()
     assert share.mean().item() == pytest.approx(expected.mean().item(), abs=0.01)
+
+
+@pytest.mark.parametrize("shape", [(6, 20), (20, 6)])
+def test_trunks_fill_an_arena_that_is_not_square_evenly(shape):
+    """Thin trunks, one an arena: every cell is hit about as often as the others."""
+    trees = sample((4000,), size=shape, n_trees=1, tree_radius=(0.5, 0.5))
+    assert trees.shape == (4000, *shape)
+    for side in (1, 2):
+        hits = trees.sum((0, 3 - side)).float()
+        expected = 4000 * math.pi / 4 / shape[side - 1]
+        assert (hits - expected).abs().max() < 5 * expected**0.5
 
 
 def test_trunks_are_those_of_the_generator():

@@ -43,9 +43,10 @@ def test_weights_are_the_same(alias, unbroken, resumed):
 def test_everything_else_is_the_same(unbroken, resumed):
     ours, theirs = (load_training(folder / "checkpoints/latest") for folder in (resumed, unbroken))
     assert ours.keys() == theirs.keys()
+    assert torch.equal(ours["rng"], theirs["rng"])
+    ours, theirs = ours["collector"], theirs["collector"]
     assert ours["frames"] == theirs["frames"] == 1024
-    for name in ("rng", "env_rng"):
-        assert torch.equal(ours[name], theirs[name])
+    assert torch.equal(ours["generator"], theirs["generator"])
     for key, value in ours["arenas"].items():
         if key.startswith("collector/"):  # numbers of the trajectories, which nothing reads
             continue
@@ -84,9 +85,26 @@ def test_missing_training_file_is_refused(run):
     assert f"resume={run / 'checkpoints/latest'}" in line and TRAINING_FILE in line
 
 
-@pytest.mark.parametrize("change", ["model.hidden=8", "env.num_envs=2"])
-def test_another_model_or_number_of_arenas_is_refused(change, run):
-    assert "other settings" in refusal(run, change)
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ("model.hidden=8", "other settings"),
+        ("env.num_envs=2", "leave env.size, env.num_envs"),
+        ("graph.max_frontiers=32", "leave env.size, env.num_envs and the observation"),
+    ],
+)
+def test_another_model_number_of_arenas_or_observation_is_refused(change, why, run):
+    assert why in refusal(run, change)
+
+
+@pytest.mark.parametrize("place", [0.01, 0.4, 0.8])
+def test_a_flipped_bit_is_noticed(place, run):
+    path = run / "checkpoints/latest" / TRAINING_FILE
+    data = bytearray(path.read_bytes())
+    data[int(place * len(data))] ^= 1
+    path.write_bytes(data)
+    line = refusal(run)
+    assert str(path) in line and "damaged" in line
 
 
 def test_training_file_runs_no_code(run):

@@ -7,7 +7,12 @@ import torch
 from tensordict import TensorDict
 
 from forestrl import keys as K
-from forestrl.envs import StaggeredEpisodes
+from forestrl.envs import (
+    ExplorationGraph,
+    FrontierPotentialReward,
+    SafetyFilter,
+    StaggeredEpisodes,
+)
 from forestrl.learning.metrics import summarize
 from tests.envs.worlds import make_transformed
 
@@ -18,6 +23,17 @@ def column(*values, dtype=torch.float32):
 
 def flags(*values):
     return column(*values, dtype=torch.bool)
+
+
+TRANSFORMS = (
+    SafetyFilter(),
+    ExplorationGraph(max_frontiers=8),
+    FrontierPotentialReward(coverage_goal=0.98),
+)
+
+
+def measured(batch):
+    return summarize(batch, TRANSFORMS)
 
 
 @pytest.fixture
@@ -75,28 +91,28 @@ EXPECTED = {
 
 @pytest.mark.parametrize(("name", "value"), EXPECTED.items())
 def test_metric_by_hand(name, value, batch):
-    assert math.isclose(summarize(batch)[name], value, rel_tol=1e-5, abs_tol=1e-6)
+    assert math.isclose(measured(batch)[name], value, rel_tol=1e-5, abs_tol=1e-6)
 
 
 def test_there_are_no_other_metrics(batch):
-    assert summarize(batch).keys() == EXPECTED.keys()
+    assert measured(batch).keys() == EXPECTED.keys()
 
 
 def test_reward_terms_add_up_to_the_mean_reward(batch):
-    terms = [value for name, value in summarize(batch).items() if name.startswith("reward/")]
+    terms = [value for name, value in measured(batch).items() if name.startswith("reward/")]
     assert math.isclose(sum(terms), batch["next", "reward"].mean(), rel_tol=1e-5)
 
 
 def test_a_replaced_step_that_reaches_the_goal_is_unsafe(batch):
     batch["next", K.INTERVENED][0, 2] = True
     batch["next", "reward"][0, 2] = -5.0
-    metrics = summarize(batch)
+    metrics = measured(batch)
     assert metrics["reward/explored"] == 0
     assert math.isclose(metrics["reward/unsafe"], -15 / 5)
 
 
 def test_levels_and_episodes_that_did_not_occur_are_nan(batch):
-    nothing = summarize(batch[:, 3:4])
+    nothing = measured(batch[:, 3:4])
     for name, value in nothing.items():
         assert math.isnan(value) == name.startswith("rollout/"), name
 
@@ -104,7 +120,7 @@ def test_levels_and_episodes_that_did_not_occur_are_nan(batch):
 def test_without_a_filter_collisions_count_as_unsafe(batch):
     batch["next"] = batch["next"].exclude(K.EXECUTED, K.INTERVENED)
     batch["next", K.COLLISION][:] = flags(0, 1, 0, 0, 1)
-    metrics = summarize(batch)
+    metrics = summarize(batch, TRANSFORMS[1:])
     assert metrics["safety/collisions"] == 2
     assert metrics["safety/intervention_rate"] == 0
     assert metrics["safety/null_actions"] == 0  # the policy's own actions
@@ -117,7 +133,20 @@ def test_reward_terms_add_up_in_a_real_rollout():
     env.append_transform(StaggeredEpisodes(20))
     batch = env.rollout(60, break_when_any_done=False)
     batch["next", "episode_reward"] = torch.zeros_like(batch["next", "reward"])
-    metrics = summarize(batch)
+    metrics = summarize(batch, env.transform)
     terms = [value for name, value in metrics.items() if name.startswith("reward/")]
     assert all(terms)
     assert math.isclose(sum(terms), batch["next", "reward"].mean(), rel_tol=1e-4)
+
+
+def test_the_reward_of_a_user_is_measured_as_a_whole_and_by_its_own_terms(batch):
+    """A transform that knows its own terms tells them; else only the mean is sure."""
+
+    class Bold:
+        def metrics(self, batch):
+            return {"reward/boldness": 3.0}
+
+    assert summarize(batch)["reward/mean"] == batch["next", "reward"].mean()
+    with_terms = summarize(batch, [Bold()])
+    assert with_terms["reward/boldness"] == 3.0 and "reward/mean" not in with_terms
+    assert not any(name.startswith(("reward/unsafe", "graph/")) for name in with_terms)

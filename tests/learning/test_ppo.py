@@ -10,7 +10,7 @@ from torchrl.envs import TransformedEnv, set_exploration_type
 from forestrl import keys as K
 from forestrl.envs import StaggeredEpisodes
 from forestrl.learning.ppo import PPO
-from forestrl.policies.actor_critic import ActorCritic
+from forestrl.policies.gatv2 import GATv2ActorCritic
 from tests.commands import compose
 from tests.envs.worlds import make_forest, paper_transforms
 
@@ -48,7 +48,7 @@ def test_table_3(name, value, train_config):
 @pytest.fixture
 def networks():
     torch.manual_seed(0)
-    return ActorCritic()
+    return GATv2ActorCritic()
 
 
 def make_ppo(networks, **options):

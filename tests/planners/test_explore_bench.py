@@ -8,7 +8,7 @@ from tensordict import TensorDict
 
 from forestrl import functional as F
 from forestrl import keys as K
-from forestrl.envs import ForestEnv, SafetyFilter
+from forestrl.envs import SafetyFilter
 from forestrl.planners import (
     CostBased,
     InformationGain,
@@ -19,7 +19,7 @@ from forestrl.planners.explore_bench import corrected, published
 from forestrl.planners.frontier.information_gain import information_gain
 from forestrl.status import Status
 from tests.drawing import draw, situation
-from tests.envs.worlds import env_for
+from tests.envs.worlds import env_for, forest_env
 from tests.planners import oracles
 from tests.states import explored_state, explored_states, random_state
 
@@ -272,7 +272,7 @@ def test_cycle_of_the_diagonal_gap_has_two_cells():
 
 def test_a_cycle_is_told_only_when_position_and_map_repeat():
     """Wherever the planner says so, it does go round: run without memory, nothing more is seen."""
-    env = ForestEnv(size=20, n_trees=12, lidar_range=3.0, num_envs=40, max_steps=10**6, seed=5)
+    env = forest_env(size=20, n_trees=12, lidar_range=3.0, num_envs=40, max_steps=10**6, seed=5)
     start = env.reset()
     planner, td = CostBased(), start.clone()
     for _ in range(250):

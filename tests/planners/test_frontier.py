@@ -177,7 +177,7 @@ def test_nearest_frontier_explores_everything_and_is_never_replaced():
         . T . . . T . . .
     """)
     env = make_transformed(lidar_range=2.0)
-    start = env.reset(given(env, trees, position))
+    start = env.reset(given(env, trees, position), set_state=True)
     after = env.rollout(100, NearestFrontier(), tensordict=start, auto_reset=False)["next"]
     assert after[K.COVERAGE][-1] >= 0.98 and after["terminated"][-1]
     assert not after[K.INTERVENED].any()

@@ -5,12 +5,11 @@ import torch
 
 from forestrl import functional as F
 from forestrl import keys as K
-from forestrl.envs import ForestEnv
 from forestrl.planners import Hindsight, NearestFrontier
 from forestrl.planners.hindsight import annealing
 from forestrl.status import Status
 from tests.drawing import world
-from tests.envs.worlds import env_for, given, make_forest
+from tests.envs.worlds import env_for, forest_env, given, make_forest
 
 LINES = F.sight_lines(3.0)
 TWO_ENDS = """
@@ -49,7 +48,7 @@ def plan(trees, position, **options):
 
 
 def forests(n, *, size=18, n_trees=8, **options):
-    env = ForestEnv(size=size, n_trees=n_trees, lidar_range=3.0, num_envs=n, **options)
+    env = forest_env(size=size, n_trees=n_trees, lidar_range=3.0, num_envs=n, **options)
     return env, env.reset()
 
 
@@ -97,7 +96,7 @@ def test_a_new_episode_is_planned_anew():
     planner = Hindsight(0.98, 3.0, 200)
     td = env.step_mdp(env.step(planner(td)))
     before = planner(td.clone())["planner", "path"]
-    fresh = env.reset(given(env, td[K.TREES].flip(0)))
+    fresh = env.reset(given(env, td[K.TREES].flip(0)), set_state=True)
     for key in (K.TREES, K.POSITION, K.CELLS, K.STEP_COUNT):
         td[key][0] = fresh[key][0]
     after = planner(td)["planner", "path"]

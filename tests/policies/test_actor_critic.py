@@ -5,13 +5,14 @@ import torch
 
 from forestrl import keys as K
 from forestrl.policies.actor_critic import ActorCritic
+from forestrl.policies.gatv2 import GATv2ActorCritic
 from tests.envs.worlds import make_transformed
 
 
 @pytest.fixture
 def networks():
     torch.manual_seed(0)
-    networks = ActorCritic()
+    networks = GATv2ActorCritic()
     with torch.no_grad():
         networks.actor.conv2.lin_l.weight.mul_(100)  # make the logits differ
     return networks
@@ -76,7 +77,7 @@ def test_actor_writes_the_log_probability_of_its_action(networks, state):
 @torch.no_grad()
 @pytest.mark.parametrize("readout", ["mean", "concat"])
 def test_critic_has_weights_of_its_own(readout, state):
-    networks = ActorCritic(critic_readout=readout)
+    networks = GATv2ActorCritic(critic_readout=readout)
     before = networks.make_actor()(state.clone())[K.LOGITS]
     assert networks.make_critic()(state)["state_value"].shape == (1, 1)
     for weight in networks.critic.parameters():
@@ -86,12 +87,37 @@ def test_critic_has_weights_of_its_own(readout, state):
 
 
 def test_table_2_shapes():
-    actor = ActorCritic().actor
+    actor = GATv2ActorCritic().actor
     assert actor.conv1.lin_l.weight.shape == (4 * 16, 8)
     assert actor.conv2.lin_l.weight.shape == (1, 64)
+
+
+def test_a_network_that_names_no_keys_is_refused():
+    with pytest.raises(ValueError, match="Linear does not say what it reads: give it in_keys"):
+        ActorCritic(torch.nn.Linear(1, 1), torch.nn.Linear(1, 1))
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e30])
+def test_a_policy_with_broken_weights_says_so(networks, state, value):
+    networks.actor.conv2.bias.fill_(float("nan") if value == 1e30 else value)
+    with pytest.raises(ValueError, match="not finite: its weights are broken"):
+        networks.make_policy()(state)
+
+
+def test_a_policy_draws_for_itself_in_a_rollout(networks):
+    """As a user of TorchRL would try it, without evaluation's own draws."""
+    env = make_transformed(num_envs=3)
+    torch.manual_seed(1)
+    first = env.rollout(12, networks.make_policy(), break_when_any_done=False)
+    env.set_seed(0)
+    torch.manual_seed(1)
+    again = env.rollout(12, networks.make_policy(), break_when_any_done=False)
+    assert len(first[K.ACTION].unique()) > 2
+    assert first[K.ACTION].shape == again[K.ACTION].shape == (3, 12)
 
 
 @pytest.mark.parametrize("name", ["kernel", "critic_readout"])
 def test_an_unknown_choice_is_refused(name):
     with pytest.raises(ValueError, match=r"must be one of .*not 'other'"):
-        ActorCritic(**{name: "other"})
+        GATv2ActorCritic(**{name: "other"})

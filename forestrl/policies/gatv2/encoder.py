@@ -58,12 +58,34 @@ class _Encode(torch.autograd.Function):
     """The encoder as one node of the autograd graph."""
 
     @staticmethod
-    def forward(ctx: Any, constants: tuple[float, float, float], *tensors: Tensor) -> Tensor:
-        ctx.constants = constants
-        ctx.save_for_backward(*tensors)
+    def forward(constants: tuple[float, float, float], *tensors: Tensor) -> Tensor:
         logits = tensors[0].new_empty(len(tensors[0]), WAYPOINTS)
         _launch(tensors[:4], tensors[4:], constants, logits)
         return logits
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
+        constants, *tensors = inputs
+        ctx.constants = constants
+        ctx.save_for_backward(*tensors)
+
+    @staticmethod
+    def vmap(
+        info: Any, in_dims: tuple[int | None, ...], constants: tuple[float, float, float],
+        *tensors: Tensor,
+    ) -> tuple[Tensor, int]:  # fmt: skip
+        """Takes one more batch dimension of the graphs for more graphs of the batch."""
+        dims = in_dims[1:]
+        if any(dim is not None for dim in dims[4:]):
+            msg = "the fused GATv2 kernel cannot vmap over its parameters: use model.kernel=pyg"
+            raise NotImplementedError(msg)
+        rows = [
+            tensor.expand(info.batch_size, *tensor.shape) if dim is None else tensor.movedim(dim, 0)
+            for tensor, dim in zip(tensors[:4], dims[:4], strict=True)
+        ]
+        graphs = [each.flatten(0, 1).contiguous() for each in rows]
+        logits = _Encode.apply(constants, *graphs, *tensors[4:])
+        return logits.unflatten(0, (info.batch_size, -1)), 0
 
     @staticmethod
     @once_differentiable
@@ -112,12 +134,7 @@ def encode(
     )
     parameters = [p.contiguous() for p in parameters]
     constants = (*slopes, 1.0 / lidar_range)
-    if torch.is_grad_enabled() and any([p.requires_grad for p in parameters]):
-        logits = _Encode.apply(constants, *graphs, *parameters)
-    else:
-        logits = x.new_empty(len(x), WAYPOINTS)
-        _launch(graphs, parameters, constants, logits)
-    return logits.view(*batch, WAYPOINTS)
+    return _Encode.apply(constants, *graphs, *parameters).view(*batch, WAYPOINTS)
 
 
 def gatv2_encoder(

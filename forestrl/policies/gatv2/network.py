@@ -10,6 +10,9 @@ from torch import Tensor, nn
 from torch_geometric.nn import GATv2Conv
 
 from forestrl import functional as F
+from forestrl import keys as K
+from forestrl.kernels.dispatch import by_device
+from forestrl.policies.actor_critic import ActorCritic
 from forestrl.policies.gatv2.encoder import gatv2_encoder
 
 Kernel = Literal["fused", "pyg"]
@@ -40,6 +43,8 @@ class GATv2Encoder(nn.Module):
         lidar_range: ``l``, cells, the unit of edge lengths.
         edge_lengths: whether the attention reads them; without, every edge counts as of length 0.
     """
+
+    in_keys = K.GRAPH
 
     def __init__(
         self,
@@ -77,34 +82,56 @@ class GATv2Encoder(nn.Module):
         """
         if not self.edge_lengths:
             length = torch.zeros_like(length)
-        if self.kernel == "fused" and x.device.type == "cpu":
-            return gatv2_encoder(
-                x, waypoint, length, frontiers, self.conv1, self.conv2, lidar_range=self.lidar_range
-            )
-        return self._pyg(x, waypoint, length, frontiers)
+        encode = _fused if self.kernel == "fused" else _pyg
+        return encode(x, waypoint, length, frontiers, self)
 
-    def _pyg(self, x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor) -> Tensor:
-        """Runs PyTorch Geometric on the batch as one graph, without the padding none uses."""
-        batch, room = x.shape[:-2], waypoint.shape[-1]
-        room = min(room, int(frontiers.max())) if frontiers.numel() else 0
-        waypoint, length = waypoint[..., :room], length[..., :room]
-        edge_index, edge_attr = F.edges(waypoint, length, frontiers, lidar_range=self.lidar_range)
-        nodes = F.WAYPOINTS + room
-        x = x[..., :nodes, :].reshape(-1, F.FEATURES)
-        edge_index = edge_index.reshape(-1, *edge_index.shape[-2:])  # (B, 2, E)
-        offset = nodes * torch.arange(len(edge_index), device=x.device)
-        edge_index = (edge_index + offset[:, None, None]).transpose(0, 1).flatten(1)
-        edge_attr = edge_attr.reshape(-1, 1)
-        hidden = self.conv1(x, edge_index, edge_attr).relu()
-        out = self.conv2(hidden, edge_index, edge_attr)
-        return out.view(*batch, nodes)[..., : F.WAYPOINTS]
+
+def _compiled(
+    x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor, network: GATv2Encoder
+) -> Tensor:
+    """Runs the compiled passes."""
+    return gatv2_encoder(
+        x, waypoint, length, frontiers, network.conv1, network.conv2,
+        lidar_range=network.lidar_range,
+    )  # fmt: skip
+
+
+def _pyg(
+    x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor, network: GATv2Encoder
+) -> Tensor:
+    """Runs PyTorch Geometric on the batch as one graph, without the padding none uses."""
+    batch, room = x.shape[:-2], _used(frontiers, waypoint.shape[-1])
+    waypoint, length = waypoint[..., :room], length[..., :room]
+    edge_index, edge_attr = F.edges(waypoint, length, frontiers, lidar_range=network.lidar_range)
+    nodes = F.WAYPOINTS + room
+    x = x[..., :nodes, :].reshape(-1, F.FEATURES)
+    edge_index = edge_index.reshape(-1, *edge_index.shape[-2:])  # (B, 2, E)
+    offset = nodes * torch.arange(len(edge_index), device=x.device)
+    edge_index = (edge_index + offset[:, None, None]).transpose(0, 1).flatten(1)
+    edge_attr = edge_attr.reshape(-1, 1)
+    hidden = network.conv1(x, edge_index, edge_attr).relu()
+    out = network.conv2(hidden, edge_index, edge_attr)
+    return out.view(*batch, nodes)[..., : F.WAYPOINTS]
+
+
+def _used(frontiers: Tensor, room: int) -> int:
+    """Gives the room for frontiers that some graph needs."""
+    if frontiers.numel() == 0:
+        return 0
+    try:
+        return min(room, int(frontiers.max()))
+    except RuntimeError:  # under vmap, as in TorchRL's GAE, no shape may depend on data
+        return room
+
+
+_fused = by_device(_compiled, _pyg)
 
 
 class Critic(nn.Module):
     """Estimates a state's value from the nine outputs of an encoder (Table II).
 
     Args:
-        encoder: maps a graph to ``[*B, 9]``; a :class:`GATv2Encoder` of its own.
+        encoder: maps what its ``in_keys`` name to ``[*B, 9]``; a network of the critic's own.
         readout: how the nine outputs are aggregated before the fully connected layer: ``"mean"``
             to ``[*B, 1]``, or ``"concat"`` to ``[*B, 9]``.
     """
@@ -115,12 +142,43 @@ class Critic(nn.Module):
             msg = f"readout must be one of {get_args(Readout)}, not {readout!r}"
             raise ValueError(msg)
         self.encoder = encoder
+        self.in_keys = encoder.in_keys
         self.readout = readout
         self.linear = nn.Linear(F.WAYPOINTS if readout == "concat" else 1, 1)
 
-    def forward(self, x: Tensor, waypoint: Tensor, length: Tensor, frontiers: Tensor) -> Tensor:
-        """Estimates the value ``[*B, 1]``; for the arguments see :class:`GATv2Encoder`."""
-        outputs = self.encoder(x, waypoint, length, frontiers)
+    def forward(self, *observation: Tensor) -> Tensor:
+        """Estimates the value ``[*B, 1]`` from what the encoder takes."""
+        outputs = self.encoder(*observation)
         if self.readout == "mean":
             outputs = outputs.mean(-1, keepdim=True)
         return self.linear(outputs)
+
+
+class GATv2ActorCritic(ActorCritic):
+    """The two networks of Table II, of the same shape and with their own weights.
+
+    Args:
+        hidden: channels a head of the first layer (Table II).
+        heads: attention heads of the first layer (Table II).
+        critic_readout: how the critic aggregates the nine outputs.
+        kernel: ``fused``, compiled for the CPU, or ``pyg``, PyTorch Geometric's layers.
+        lidar_range: ``l``, cells, the unit of edge lengths.
+        edge_lengths: whether the attention reads them.
+    """
+
+    adjustable = ("kernel", "lidar_range")
+    """Settings that the weights do not depend on."""
+
+    def __init__(
+        self,
+        hidden: int = 16,
+        heads: int = 4,
+        critic_readout: Readout = "mean",
+        kernel: Kernel = "fused",
+        lidar_range: float = 5.0,
+        edge_lengths: bool = True,
+    ) -> None:
+        def encoder() -> GATv2Encoder:
+            return GATv2Encoder(hidden, heads, kernel, lidar_range, edge_lengths)
+
+        super().__init__(encoder(), Critic(encoder(), readout=critic_readout))

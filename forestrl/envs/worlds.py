@@ -1,0 +1,118 @@
+"""Sources of worlds: where an episode takes place, and where in it the robot starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from forestrl import functional as F
+from forestrl import kernels
+
+SMALLEST_SIDE = 3
+_ATTEMPTS = 8  # forests drawn before giving up on finding one with a free cell
+
+
+class World(Protocol):
+    """A source of worlds of one shape, for :class:`~forestrl.envs.ForestEnv`."""
+
+    shape: tuple[int, int]
+    """Rows and columns of every arena, cells."""
+
+    def sample(
+        self, batch: tuple[int, ...], *, generator: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Draws arenas with a start each.
+
+        Args:
+            batch: leading dimensions.
+            generator: source of randomness; the results are on its device.
+
+        Returns:
+            occupied cells, bool ``[*batch, H, W]``, and the robot's cells, int64 ``[*batch, 2]``,
+            each free.
+        """
+
+
+class RandomForest:
+    """Forests of round trunks: centres and radii uniform, overlaps allowed (Table III).
+
+    The start is a free cell drawn uniformly from the largest 8-connected component of free cells. A
+    forest without a free cell is drawn again.
+
+    Args:
+        shape: rows and columns, cells; one number for a square arena of side ``h``.
+        n_trees: number of trunks ``n_t``.
+        tree_radius: smallest and largest trunk radius ``r_t``, cells.
+
+    Raises:
+        ValueError: if a value is out of its range; the message names both.
+
+    Examples:
+        >>> forest = RandomForest((20, 30), n_trees=5)
+        >>> trees, start = forest.sample((4,), generator=torch.Generator())
+        >>> trees.shape, start.shape
+        (torch.Size([4, 20, 30]), torch.Size([4, 2]))
+    """
+
+    def __init__(
+        self,
+        shape: int | tuple[int, int] = 50,
+        n_trees: int = 45,
+        tree_radius: tuple[float, float] = (1.0, 3.0),
+    ) -> None:
+        self.shape = arena_shape(shape)
+        if n_trees < 0:
+            raise ValueError(f"n_trees={n_trees} is not allowed: it must be 0 or more")
+        if len(tree_radius) != 2 or not 0 < tree_radius[0] <= tree_radius[1]:
+            raise ValueError(
+                f"tree_radius={list(tree_radius)} is not allowed: it must be [smallest, largest] "
+                "with 0 < smallest <= largest"
+            )
+        self.n_trees, self.tree_radius = n_trees, (tree_radius[0], tree_radius[1])
+
+    def sample(
+        self, batch: tuple[int, ...], *, generator: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Draws forests and starts, see :class:`World`.
+
+        Raises:
+            ValueError: if no forest with a free cell turns up.
+        """
+        trees = self._draw(batch, generator)
+        for _ in range(_ATTEMPTS):
+            full = trees.flatten(-2).all(-1)
+            if not full.any():
+                return trees, F.sample_position(kernels.largest_component(~trees), generator)
+            trees = torch.where(full[..., None, None], self._draw(batch, generator), trees)
+        raise ValueError(
+            f"n_trees={self.n_trees} of radius {list(self.tree_radius)} leaves no free cell in an "
+            f"arena of {self.shape[0]} x {self.shape[1]} cells: take fewer or thinner trees or a "
+            "larger arena"
+        )
+
+    def _draw(self, batch: tuple[int, ...], generator: torch.Generator) -> Tensor:
+        return F.sample_trees(
+            batch,
+            shape=self.shape,
+            n_trees=self.n_trees,
+            tree_radius=self.tree_radius,
+            generator=generator,
+        )
+
+
+def arena_shape(shape: int | tuple[int, int]) -> tuple[int, int]:
+    """Gives rows and columns from either, or from the side of a square.
+
+    Raises:
+        ValueError: if there are not one or two numbers of at least 3.
+    """
+    sides = tuple(shape) if isinstance(shape, Sequence) else (shape, shape)
+    if len(sides) != 2 or not all(isinstance(s, int) and s >= SMALLEST_SIDE for s in sides):
+        raise ValueError(
+            f"shape={shape} is not allowed: it must be a side or [rows, columns] of at least "
+            f"{SMALLEST_SIDE} cells"
+        )
+    return sides
