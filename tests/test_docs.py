@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import shlex
@@ -10,6 +11,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from tests.commands import train
 
 ROOT = Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"^```(python|yaml|bash)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -60,3 +63,24 @@ def test_the_page_on_extending_runs_as_it_stands(tmp_path):
     assert (tmp_path / "logged/metrics.jsonl").read_text().count("frames") == 4
     assert (tmp_path / "multirun/mine/table.md").is_file()
     assert list(tmp_path.glob("outputs/render/*/episode.gif"))
+
+
+def explained():
+    """The metrics that the page names, with the levels written out."""
+    names = re.findall(
+        r"^\| `([a-z_/A-Z0-9]+)`", (ROOT / "docs/metrics.md").read_text(), re.MULTILINE
+    )
+    levels = {"rollout/steps_to_N": (80, 90, 98), "eval/steps_to_N": (80, 95, 98)}
+    for name in names:
+        if name in levels:
+            yield from (name.replace("N", str(level)) for level in levels[name])
+        else:
+            yield name
+
+
+def test_every_metric_of_a_training_is_explained_and_no_other(tmp_path):
+    run = train(tmp_path)
+    with (run / "metrics.csv").open(newline="") as file:
+        logged = next(csv.reader(file))
+    assert set(explained()) - {"reward/mean"} == set(logged)
+    assert "reward/mean" in set(explained())  # of other rewards; tests/learning/test_metrics.py
