@@ -85,7 +85,7 @@ def report(
     words = [word for word in HydraConfig.get().overrides.task if not word.startswith("resume=")]
     command = shlex.join(["forestrl", "eval", *words])
     meta = {**settings, "version": __version__, "command": command}
-    paper = all(cfg.env[name] == value for name, value in ARENA.items())
+    paper = all(cfg.env.get(name) == value for name, value in ARENA.items())
     summary = write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)
     parts.clear()
     return episodes, summary

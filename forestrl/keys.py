@@ -1,13 +1,13 @@
 """The TensorDict schema: every key that two places share, once.
 
-Groups say whose knowledge an entry is. ``*B`` is the env's batch, ``h`` the arena side, ``M`` the
-room for frontier nodes.
+Groups say whose knowledge an entry is. ``*B`` is the env's batch, ``H`` and ``W`` are rows and
+columns of the arena (the paper's ``h``), ``M`` is the room for frontier nodes.
 
 | key | symbol | shape, dtype | written by |
 |---|---|---|---|
-| ``("arena", "trees")`` | M | ``[*B, h, h]`` bool, hidden truth | ForestEnv |
-| ``("arena", "traversable")`` | under rho | ``[*B, h, h]`` bool, hidden truth | ForestEnv |
-| ``("map", "cells")`` | M^a_t | ``[*B, h, h]`` uint8, ``Cell`` | ForestEnv |
+| ``("arena", "trees")`` | M | ``[*B, H, W]`` bool, hidden truth | ForestEnv |
+| ``("arena", "traversable")`` | under rho | ``[*B, H, W]`` bool, hidden truth | ForestEnv |
+| ``("map", "cells")`` | M^a_t | ``[*B, H, W]`` uint8, ``Cell`` | ForestEnv |
 | ``("agent", "position")`` | p^t | ``[*B, 2]`` int64 (row, col) | ForestEnv |
 | ``("exploration", "new_cells")`` | n^e_t | ``[*B, 1]`` float32 | ForestEnv |
 | ``("exploration", "coverage")`` | rho_t | ``[*B, 1]`` float32 in [0, 1] | ForestEnv |

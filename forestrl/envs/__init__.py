@@ -5,8 +5,10 @@ from collections.abc import Mapping
 from torchrl.envs.transforms import Transform
 
 from forestrl.envs.forest import ForestEnv
+from forestrl.envs.graph import ExplorationGraph
+from forestrl.envs.reward import FrontierPotentialReward
+from forestrl.envs.safety import SafetyFilter
 from forestrl.envs.training import StaggeredEpisodes
-from forestrl.envs.transforms import ExplorationGraph, FrontierPotentialReward, SafetyFilter
 from forestrl.envs.worlds import RandomForest, World
 
 OBSERVATIONS: Mapping[str, type[Transform]] = {"exploration_graph": ExplorationGraph}

@@ -54,7 +54,7 @@ def a_star_action(truth: np.ndarray, stride: int, source: int, goal: int) -> int
     the cell that is first in row-major order is taken.
 
     Args:
-        truth: free cells of the true arena, from :func:`forestrl.planners.steps.pad`.
+        truth: free cells of the true arena, from :func:`forestrl.kernels.flood.pad`.
         stride: of the padded map.
         source: the agent's cell.
         goal: another cell.

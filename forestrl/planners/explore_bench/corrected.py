@@ -158,7 +158,8 @@ def cost(cells: Tensor, position: Tensor, goal: Tensor) -> tuple[Tensor, Tensor,
         goal: the goal to keep, int64 ``[*B, 2]``; (-1, -1) asks for a new one.
 
     Returns:
-        action, int64 ``[*B]``, :class:`Status`, int8 ``[*B]``, and the goal, int64 ``[*B, 2]``.
+        action, int64 ``[*B]``, :class:`~forestrl.status.Status`, int8 ``[*B]``, and the goal, int64
+        ``[*B, 2]``.
     """
     return _planned(cells, position, goal, downhill=False)
 

@@ -178,7 +178,7 @@ def cost(cells: Tensor, position: Tensor, trees: Tensor) -> tuple[Tensor, Tensor
         trees: the true arena, for the way to the goal only, bool ``[*B, H, W]``.
 
     Returns:
-        action, int64 ``[*B]``, and :class:`Status`, int8 ``[*B]``.
+        action, int64 ``[*B]``, and :class:`~forestrl.status.Status`, int8 ``[*B]``.
     """
     return _as_published(_cost, cells, position, trees)
 

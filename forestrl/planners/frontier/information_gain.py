@@ -87,7 +87,7 @@ def information_gain(
         power: exponent of the path length, 0 or more.
 
     Returns:
-        action, int64 ``[*B]``, and :class:`Status`, int8 ``[*B]``.
+        action, int64 ``[*B]``, and :class:`~forestrl.status.Status`, int8 ``[*B]``.
     """
     maps, places, action, status = arguments(cells, position)
     cost = _powers(maps.shape[-2] * maps.shape[-1] + 1, float(power))
