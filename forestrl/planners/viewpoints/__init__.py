@@ -1,0 +1,1 @@
+"""Planners that go where most is to be seen, on the way and at its end."""
