@@ -11,11 +11,14 @@ from tensordict import TensorDict
 from forestrl import functional as F
 from forestrl import kernels
 from forestrl import keys as K
+from forestrl.benchmark.attention import plain_attend, random_inputs
 from forestrl.benchmark.measuring import Stage
 from forestrl.envs.graph import WINDOW
 from forestrl.policies.gatv2 import GATv2Encoder
+from forestrl.policies.gatv2.passes import _attend
 
 _GRAPHS = 16  # of a minibatch (Table III)
+_EDGES = 144  # into the core nodes of a mean graph in 50 x 50 cells
 _LIDAR_RANGE, _BETA = 5.0, 0.5  # Table III
 
 
@@ -48,3 +51,6 @@ def compiled(worlds: TensorDict, room: int) -> Iterator[list[Stage]]:
 
     name = "GATv2 forward + backward"
     yield [Stage(name, len(graphs.x), partial(learn, each), v) for v, each in networks.items()]
+    inputs = random_inputs(_GRAPHS * _EDGES)
+    loops = {"compiled": _attend, "plain loops": plain_attend}
+    yield [Stage("GATv2 attention", _GRAPHS, partial(f, *inputs), v) for v, f in loops.items()]
