@@ -20,7 +20,7 @@ from forestrl.evaluation.parts import Parts
 from forestrl.evaluation.picture import draw_episode
 from forestrl.evaluation.report import table, write_report
 from forestrl.loggers import Logger, NoLogger
-from forestrl.paper import ARENA
+from forestrl.paper import coverage_of
 
 
 def run(cfg: DictConfig, policy: Any, parts: Parts) -> Episodes:
@@ -85,7 +85,7 @@ def report(
     words = [word for word in HydraConfig.get().overrides.task if not word.startswith("resume=")]
     command = shlex.join(["forestrl", "eval", *words])
     meta = {**settings, "version": __version__, "command": command}
-    paper = all(cfg.env.get(name) == value for name, value in ARENA.items())
+    paper = coverage_of(about["policy"], cfg.policy.get("variant"), cfg.env)
     summary = write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)
     parts.clear()
     return episodes, summary
@@ -101,12 +101,14 @@ def log(
 ) -> None:
     """Sends the report to a dashboard, with an episode in the first arena."""
     settings, picture = cfg.eval, folder / "episode.gif"
-    end = summary["coverage"][str(settings.steps)]
+    rows = {row["measure"]: row for row in summary["measures"]}
+    end = rows[f"coverage_{settings.steps}"]
     interval = {f"eval/coverage_{side}": end[side] for side in ("low", "high")}
     known = {name: value for name, value in interval.items() if value is not None}
     logger.log_metrics(eval_metrics(episodes) | known, step=0)
     logger.log_figure("eval/coverage_curve", folder / "coverage.png", step=0)
-    logger.log_figure("eval/interventions", folder / "interventions.png", step=0)
+    if (folder / "interventions.png").is_file():
+        logger.log_figure("eval/interventions", folder / "interventions.png", step=0)
     logger.log_table("eval/episodes", folder / "episodes.csv")
     draw_episode(
         build.make_env(cfg, 1, policy),

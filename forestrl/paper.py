@@ -1,5 +1,8 @@
 """The paper's own numbers (Sec. III), to stand beside ours; shares, not per cent."""
 
+from collections.abc import Mapping
+from typing import Any
+
 ARENA = {"size": 50, "n_trees": 45}
 """Table III: where the numbers of Fig. 3 hold."""
 COVERAGE = {1000: 0.80, 2000: 0.95, 2500: 0.97}
@@ -18,3 +21,19 @@ DENSE_INTERVENTION_RATE = 0.20
 """Fig. 4c: interventions with 75 trunks, about."""
 DIP, FRAMES = 60_000, 400_000
 """Fig. 3a: frames of the small decline, and of the whole training."""
+
+
+def coverage_of(policy: str, variant: str | None, env: Mapping[str, Any]) -> dict[int, float]:
+    """Gives the paper's own numbers for a policy, by step; none outside its arenas (Fig. 3b).
+
+    Args:
+        policy: ``learned``, ``cost``, ``mmpf`` or another.
+        variant: of the planner; the paper's are as published.
+        env: settings of the env.
+    """
+    if any(env.get(name) != value for name, value in ARENA.items()):
+        return {}
+    if policy == "learned":
+        return COVERAGE
+    published = policy in BENCHMARKS and variant == "published"
+    return {2500: BENCHMARKS[policy]} if published else {}

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import math
+import numbers
 import os
 import secrets
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 
 def atomic_write(path: str | os.PathLike[str], data: str | bytes) -> Path:
@@ -32,3 +38,17 @@ def atomic_write(path: str | os.PathLike[str], data: str | bytes) -> Path:
         part.unlink(missing_ok=True)
         raise
     return path
+
+
+def csv_text(rows: Iterable[Sequence[Any]]) -> str:
+    """Lays rows out as CSV, head first: floats with six digits, nan and None as nothing."""
+    buffer = io.StringIO(newline="")
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerows([_entry(value) for value in row] for row in rows)
+    return buffer.getvalue()
+
+
+def _entry(value: object) -> object:
+    if isinstance(value, numbers.Real) and not isinstance(value, numbers.Integral | bool):
+        return "" if math.isnan(value) else f"{float(value):.6g}"
+    return "" if value is None else value

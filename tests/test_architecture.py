@@ -10,9 +10,9 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
 
 L0 = {"functional", "kernels"}
-L1 = {"keys", "paper", "sampling", "status", "storage", "progress"}
+L1 = {"keys", "paper", "sampling", "statistics", "status", "storage", "progress"}
 L2 = {"envs", "policies", "planners", "learning"}
-STUDIES = {"evaluation", "publishing", "rendering", "benchmark"}
+STUDIES = {"evaluation", "publishing", "rendering", "benchmark", "sweeps", "tables"}
 L3 = {"config", "command", "loggers", "build"}
 L4 = {"train", "eval", "render", "collisions", "bench", "figures"}
 ROOMS = {  # room: the other rooms it may import from
@@ -26,7 +26,9 @@ ROOMS = {  # room: the other rooms it may import from
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
     "benchmark": L0 | L1 | L2 | {"planner"},
-    "publishing": {"paper"},
+    "tables": {"statistics"},
+    "sweeps": {"evaluation", "statistics", "storage", "tables"},
+    "publishing": {"evaluation", "paper", "statistics", "sweeps", "tables"},
     "config": set(),
     "command": {"config"},
     "loggers": {"storage"},
@@ -44,7 +46,10 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "paper": set(),
     "status": set(),
     "storage": set(),
-    "publishing": {"numpy", "scipy", "matplotlib"},
+    "statistics": {"numpy", "scipy"},
+    "tables": {"tabulate"},
+    "sweeps": {"yaml"},
+    "publishing": {"numpy", "pandas", "yaml", "matplotlib"},
     "progress": {"tqdm"},
     "cli": set(),
 }

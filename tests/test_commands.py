@@ -85,12 +85,15 @@ def test_a_job_that_fails_does_not_stop_the_sweep(tmp_path):
 def test_eval_writes_its_report(run, tmp_path):
     evaluate(tmp_path, f"checkpoint={run}", "eval.arenas=3")
     assert [row["index"] for row in rows(tmp_path / "episodes.csv")] == ["0", "1", "2"]
-    assert len(rows(tmp_path / "curve.csv")) == 31
+    assert len(rows(tmp_path / "curve.csv")) == 4  # 0, 10, 20, 30
     for name in ("coverage.png", "interventions.png"):
         with Image.open(tmp_path / name) as picture:
             assert picture.format == "PNG"
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert (summary["arenas"], summary["steps"], summary["collisions"]) == (3, 30, 0)
+    assert (summary["arenas"], summary["steps"]) == (3, 30)
+    assert {"measure": "collisions", "mean": 0.0, "low": None, "high": None, "n": 3} in summary[
+        "measures"
+    ]
     assert summary["meta"]["training"]["frames"] in (512, 1024)
 
 
@@ -119,7 +122,9 @@ def test_with_the_filter_there_are_no_collisions_and_without_it_there_are(run, t
     options = ("policy=random", "policy.feasible_only=false", "eval.arenas=5")
     for safety in ("filter", "none"):
         report = evaluate(tmp_path / safety, f"safety={safety}", *options) / "summary.json"
-        assert (json.loads(report.read_text())["collisions"] > 0) == (safety == "none")
+        measures = json.loads(report.read_text())["measures"]
+        (collisions,) = (row["mean"] for row in measures if row["measure"] == "collisions")
+        assert (collisions > 0) == (safety == "none")
 
 
 REFUSED = [

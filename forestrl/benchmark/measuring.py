@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import torch
 from torch.utils.benchmark import Measurement, Timer
+
+from forestrl.storage import csv_text
 
 _COLUMNS = (
     "table stage version rows columns n_trees coverage frontiers max_frontiers num_envs frames "
@@ -82,11 +82,9 @@ def known(measured: Measurement) -> dict[str, Any]:
 
 def to_csv(measured: Sequence[Measurement]) -> str:
     """Returns a row for each measurement: times of a frame in seconds, empty where unknown."""
-    buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, _COLUMNS, lineterminator="\n")
-    writer.writeheader()
+    rows: list[list[Any]] = [_COLUMNS]
     for each in measured:
         row = {**known(each), "seconds": each.median, "iqr": each.iqr}
         row |= {"repeats": len(each.times), "frames_per_second": 1 / each.median}
-        writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
-    return buffer.getvalue()
+        rows.append([row.get(name) for name in _COLUMNS])
+    return csv_text(rows)

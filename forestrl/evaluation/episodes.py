@@ -17,8 +17,7 @@ from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.evaluation.arenas import draw_arenas, uniforms
 from forestrl.evaluation.endings import ending
-
-_NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
+from forestrl.statistics import normal_interval
 
 
 class Curve(NamedTuple):
@@ -84,15 +83,8 @@ class Episodes:
         return (coverage.sum(1) - (coverage[:, 0] + coverage[:, -1]) / 2) / upto
 
     def mean_curve(self) -> Curve:
-        """Gives the mean coverage by step with a normal 95 % interval over arenas.
-
-        The interval is mean ± 1.96 standard errors, cut to [0, 1]; with one arena it is nan.
-        """
-        mean = self.coverage.mean(0, dtype=np.float64)
-        if len(self) == 1:
-            return Curve(mean, np.full_like(mean, np.nan), np.full_like(mean, np.nan))
-        margin = _NORMAL_95 * self.coverage.std(0, dtype=np.float64, ddof=1) / np.sqrt(len(self))
-        return Curve(mean, np.maximum(mean - margin, 0.0), np.minimum(mean + margin, 1.0))
+        """Gives the mean coverage by step with a normal 95 % interval over arenas."""
+        return Curve(*normal_interval(self.coverage))
 
     @classmethod
     def concatenate(cls, parts: Sequence[Episodes]) -> Episodes:

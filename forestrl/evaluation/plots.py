@@ -1,8 +1,9 @@
-"""The two pictures of an evaluation, with the paper's own numbers marked."""
+"""The two pictures of an evaluation, with the paper's own numbers where they belong."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,16 +17,15 @@ _SIZE, _DPI = (6.4, 4.0), 150  # inches, dots per inch: 960 x 600 pixels
 _OURS, _THEIRS = "#0072B2", "black"  # a mid grey and black in print
 _BARS = "#7FB8D8"
 _BIN = 0.025
-_LEGEND_TOP = 0.35  # of the height of the axes
 
 
-def coverage_png(episodes: Episodes, *, title: str, paper: bool = True) -> bytes:
+def coverage_png(episodes: Episodes, *, title: str, paper: Mapping[int, float]) -> bytes:
     """Draws the mean coverage against steps (Fig. 3b).
 
     Args:
         episodes: what to draw.
         title: stands above the picture.
-        paper: whether the paper's numbers are marked.
+        paper: the paper's own numbers for this policy in these arenas, by step; shares.
 
     Returns:
         a PNG file.
@@ -47,8 +47,8 @@ def coverage_png(episodes: Episodes, *, title: str, paper: bool = True) -> bytes
             label="95 % interval of the mean",
         )
     axes.plot(steps, 100 * curve.mean, color=_OURS, lw=1.8, label=f"mean of {_arenas(episodes)}")
-    marks = {step: level for step, level in P.COVERAGE.items() if step <= episodes.steps}
-    if paper and marks:
+    marks = {step: level for step, level in paper.items() if step <= episodes.steps}
+    if marks:
         axes.plot(
             list(marks),
             [100 * level for level in marks.values()],
@@ -62,17 +62,16 @@ def coverage_png(episodes: Episodes, *, title: str, paper: bool = True) -> bytes
             zorder=5,
         )
     axes.set(xlim=(0, episodes.steps), ylim=(0, 100))
-    axes.legend(loc="lower right" if low[-1] > _LEGEND_TOP else "upper left", frameon=False)
     return _png(axes)
 
 
-def interventions_png(episodes: Episodes, *, title: str, paper: bool = True) -> bytes:
+def interventions_png(episodes: Episodes, *, title: str, paper: bool) -> bytes:
     """Draws how the share of steps with an intervention is distributed (Fig. 3c).
 
     Args:
         episodes: what to draw.
         title: stands above the picture.
-        paper: whether the paper's numbers are marked.
+        paper: whether the paper's numbers about its policy are marked.
 
     Returns:
         a PNG file.
@@ -92,10 +91,7 @@ def interventions_png(episodes: Episodes, *, title: str, paper: bool = True) -> 
     if paper:
         label += f" (paper: {100 * P.SHARE_UNDER_LIMIT:.0f} %)"
     axes.axvline(100 * P.INTERVENTION_LIMIT, color=_THEIRS, lw=1.4, ls=":", label=label)
-    axes.set_xlim(0, 100 * end)
-    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])  # room for the legend
-    axes.set_yticks([tick for tick in axes.get_yticks() if tick <= 100])
-    axes.legend(loc="upper right", frameon=False)
+    axes.set(xlim=(0, 100 * end), ylim=(0, min(1.05 * axes.get_ylim()[1], 105)))
     return _png(axes)
 
 
@@ -116,6 +112,9 @@ def _axes(title: str, xlabel: str, ylabel: str) -> Axes:
 
 
 def _png(axes: Axes) -> bytes:
+    """Puts the legend below the axes, where nothing crosses it, and draws."""
+    handles, labels = axes.get_legend_handles_labels()
+    axes.figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     buffer = io.BytesIO()
     axes.figure.canvas.print_figure(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()

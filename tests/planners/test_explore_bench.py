@@ -267,7 +267,7 @@ def test_cycle_of_the_diagonal_gap_has_two_cells():
     assert len(set(positions[-20:])) == 2 and positions[-1] == positions[-3]
 
 
-# Statuss and memory.
+# Status and memory.
 
 
 def test_a_cycle_is_told_only_when_position_and_map_repeat():

@@ -9,8 +9,9 @@ SIDES = {"nominal": (50, 45), "trees75": (50, 75), "size75": (75, 101)}
 STEPS = 2500
 
 
-def mean(value, margin=0.01):
-    return {"mean": value, "low": value - margin, "high": value + margin}
+def row(measure, value, margin=None, n=2):
+    low, high = (None, None) if margin is None else (value - margin, value + margin)
+    return {"measure": measure, "mean": value, "low": low, "high": high, "n": n}
 
 
 def write_evaluation(
@@ -22,25 +23,24 @@ def write_evaluation(
     size, trees = SIDES[setting]
     average = sum(coverage) / len(coverage)
     reached = sum(share >= 0.1 for share in coverage) / len(coverage)
-    summary = {
-        "arenas": len(coverage),
-        "steps": STEPS,
-        "coverage": {str(step): mean(average) for step in (250, 500, 1000, 2000, STEPS)},
-        "steps_to": {"98": mean(400, 10) | {"reached": reached}},
-        "area_under_curve": {"500": mean(average), "2500": mean(average)},
-        "interventions": {
-            "rate": mean(rate, 0.01 if rate else 0.0),
-            "percentile_80": rate,
-            "share_under_15": 1.0,
-        },
-        "collisions": 0,
-        "endings": {"covered": 1.0} if endings is None else endings,
-        "meta": {
-            "command": f"forestrl eval policy={name}",
-            "env": {"size": size, "n_trees": trees, "tree_radius": [1.0, 3.0]},
-            "eval": {"seed": 0},
-        },
+    ends = {"covered": 1.0} if endings is None else endings
+    measures = [
+        *(row(f"coverage_{step}", average, 0.01) for step in (250, 500, 1000, 2000, STEPS)),
+        row("steps_to_98", 400, 10),
+        row("reached_98", reached),
+        *(row(f"area_{upto}", average, 0.01) for upto in (500, 2500)),
+        row("intervention_rate", rate, 0.01 if rate else 0.0),
+        row("percentile_80", rate),
+        row("share_under_15", 1.0),
+        row("collisions", 0.0),
+        *(row(f"ended_{kind}", share) for kind, share in ends.items()),
+    ]
+    meta = {
+        "command": f"forestrl eval policy={name}",
+        "env": {"size": size, "n_trees": trees, "tree_radius": [1.0, 3.0]},
+        "eval": {"seed": 0},
     }
+    summary = {"arenas": len(coverage), "steps": STEPS, "measures": measures, "meta": meta}
     (folder / "summary.json").write_text(json.dumps(summary))
     steps = ["" if share < 0.1 else str(400 + i) for i, share in enumerate(coverage)]
     rows = [f"{i},{share},{share},{rate},{steps[i]}" for i, share in enumerate(coverage)]
@@ -59,7 +59,15 @@ def write_training(path: Path, returns=(0.0, 50.0, 100.0), evaluated=()):
     for i, value in enumerate(returns):
         coverage = evaluated[i - blank] if i >= blank else ""
         collisions = 0 if i >= blank else ""
-        row = (1000 * (i + 1), value, value / 100, coverage, coverage, collisions)
-        lines.append(",".join(map(str, row)))
+        values = (1000 * (i + 1), value, value / 100, coverage, coverage, collisions)
+        lines.append(",".join(map(str, values)))
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def write_job(folder: Path, *overrides: str):
+    """What Hydra writes into the folder of a sweep's job."""
+    (folder / ".hydra").mkdir(parents=True)
+    text = "".join(f"- {override}\n" for override in overrides) or "[]\n"
+    (folder / ".hydra/overrides.yaml").write_text(text)
+    return folder

@@ -3,13 +3,13 @@
 import pytest
 from PIL import Image
 
-from forestrl.publishing.files import ResultError
-from forestrl.publishing.readme import replace_between_marks
+from forestrl.evaluation.reading import ResultError
+from forestrl.publishing.page import replace_between_marks
 from tests.commands import forestrl
-from tests.publishing.folders import write_evaluation, write_training
+from tests.publishing.folders import write_evaluation, write_job, write_training
 
 FIGURES = [f"fig{name}" for name in ("3a", "3b", "3c", "4a", "4b", "4c")]
-README = "# Title  \r\n\ntext <!-- results -->stale<!-- /results -->\nmore, no line end"
+README = "# Title  \r\n\ntext <!-- table -->stale<!-- /table -->\nmore, no line end"
 
 
 @pytest.fixture
@@ -25,7 +25,8 @@ def results(tmp_path):
 
 
 def figures(folder, *arguments):
-    return forestrl("figures", f"results={folder}", *(arguments or ("readme=null",)))
+    asked = arguments or ("readme=null",)
+    return forestrl("figures", f"results={folder}", f"page={folder}/page.md", *asked)
 
 
 def test_every_figure_is_drawn_in_both_formats(results):
@@ -45,46 +46,52 @@ def test_a_deleted_figure_comes_back_byte_for_byte(results):
     before = {path: path.read_bytes() for path in results.rglob("*.*") if path.is_file()}
     for name in ("fig3b.png", "fig4c.pdf"):
         (results / "figures" / name).unlink()
-    (results / "table.md").unlink()
+    (results / "page.md").unlink()
     figures(results)
     assert {path: path.read_bytes() for path in results.rglob("*.*") if path.is_file()} == before
 
 
-def test_readme_gets_the_results_and_keeps_the_rest(results, tmp_path):
+def test_readme_gets_the_numbers_and_keeps_the_rest(results, tmp_path):
     readme = tmp_path / "README.md"
     readme.write_bytes(README.encode())
     for _ in range(2):  # the second time changes nothing
         assert figures(results, f"readme={readme}").status == 0
         text = readme.read_bytes().decode()
-        assert text.startswith("# Title  \r\n\ntext <!-- results -->\n\n### In a minute")
-        assert text.endswith("\n\n<!-- /results -->\nmore, no line end") and "stale" not in text
-    for table in ("table.md", "differences.md"):
-        assert (results / table).read_text().splitlines()[-1] in text
-    assert '<img src="results/figures/fig4a.png"' in text
+        assert text.startswith("# Title  \r\n\ntext <!-- table -->\n\n| policy")
+        assert text.endswith("\n\n<!-- /table -->\nmore, no line end") and "stale" not in text
+
+
+def test_the_page_has_tables_figures_and_the_commands_behind_them(results):
+    figures(results)
+    text = (results / "page.md").read_text()
+    headings = [line for line in text.splitlines() if line.startswith("## ")]
+    assert headings[0] == "## In a minute" and headings[-1] == "## Figures"
+    assert "## What each part is good for" not in headings  # there are no ablations
+    assert '<img src="figures/fig4a.png"' in text and "{" not in text.replace("/{", "")
     assert f"forestrl eval policy=learned hydra.run.dir={results}/size75/learned\n" in text
     assert "forestrl train experiment=paper seed=0\n" in text
 
 
+def test_a_method_that_was_not_measured_is_refused_with_those_that_were(results):
+    result = figures(results, "method=leaned", "readme=null")
+    assert result.status == 1 and result.err.count("\n") == 1
+    assert f"method=leaned is not in {results}: it has cost_published, learned" in result.err
+
+
 def write_sweep(folder, jobs):
     for name, overrides in jobs.items():
-        hydra = folder / name / ".hydra"
-        hydra.mkdir(parents=True)
-        (hydra / "overrides.yaml").write_text("".join(f"- {override}\n" for override in overrides))
-        write_training(folder / name / "metrics.csv", evaluated=(0.5,))
+        job = write_job(folder / name, *overrides)
+        write_training(job / "metrics.csv", evaluated=(0.5,))
 
 
-def test_committed_ablations_are_in_the_readme(results, tmp_path):
+def test_committed_ablations_are_on_the_page(results):
     jobs = {"0": ["ablation=none", "seed=0"], "1": ["ablation=no_filter", "seed=0"]}
     write_sweep(results / "ablations", jobs)
-    readme = tmp_path / "README.md"
-    readme.write_bytes(README.encode())
-    assert figures(results, f"readme={readme}").status == 0
-    text = readme.read_text()
-    for line in (
-        "### What each part is good for",
-        "| `ablation=no_filter` | 1 seed | 3000 | 50.0 |",
-    ):
-        assert line in text and line in (results / "table.md").read_text()
+    assert figures(results).status == 0
+    text = (results / "page.md").read_text()
+    assert "## What each part is good for" in text
+    (line,) = (line for line in text.splitlines() if "`ablation=no_filter`" in line)
+    assert [cell.strip() for cell in line.split("|")][2:5] == ["1 seed", "3000", "50.0"]
 
 
 def test_a_figure_without_data_is_skipped_with_what_it_wants(tmp_path):
@@ -107,9 +114,9 @@ def broken(folder, file, old, new):
         (lambda f: (f / "curve.csv").unlink(), "nominal/learned/curve.csv is missing"),
         (lambda f: (f / "summary.json").write_text("{"), "summary.json is not valid JSON"),
         (lambda f: (f / "summary.json").write_text("[]"), "summary.json lacks arenas"),
-        (lambda f: (f / "episodes.csv").write_text(""), "episodes.csv lacks the column index"),
-        (lambda f: broken(f, "episodes.csv", "0,0.9", "0,high"), "episodes.csv, line 2: could not"),
-        (lambda f: broken(f, "episodes.csv", "0,0.9", "0.9"), "line 2: 4 fields instead of 5"),
+        (lambda f: (f / "episodes.csv").write_text(""), "episodes.csv cannot be read: No columns"),
+        (lambda f: broken(f, "episodes.csv", "0,0.9", "0,high"), "line 2: coverage is 'high', no number"),
+        (lambda f: broken(f, "episodes.csv", "1,0.8", "1,0.8,7"), "cannot be read: Error token"),
         (lambda f: broken(f, "summary.json", '"arenas": 2', '"arenas": 3'), "has 2 rows"),
         (lambda f: broken(f, "summary.json", '"n_trees": 45', '"n_trees": 60'),
          "was evaluated with env.size=50 env.n_trees=60; nominal wants 50 and 45"),
@@ -140,11 +147,11 @@ def test_an_empty_folder_says_what_it_wants(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["none", "<!-- /results --><!-- results -->", 2 * "<!-- results --><!-- /results -->"]
+    "text", ["none", "<!-- /table --><!-- table -->", 2 * "<!-- table --><!-- /table -->"]
 )
 def test_marks_must_be_there_once_in_order(text):
     with pytest.raises(ResultError, match="once each"):
-        replace_between_marks(text, "new")
+        replace_between_marks(text, "table", "new")
 
 
 def test_a_sweep_is_summed_up_in_its_folder(tmp_path):

@@ -2,14 +2,12 @@
 
 import pytest
 
-from forestrl.publishing.comparisons import differences, forests
-from forestrl.publishing.endings import endings
-from forestrl.publishing.learning import learning
-from forestrl.publishing.reproduction import findings, reproduction, verdict
+from forestrl.evaluation.reading import last_step_ahead
 from forestrl.publishing.results import read_results
-from forestrl.publishing.statistics import Interval
-from forestrl.publishing.summary import last_step_ahead, summary
-from forestrl.publishing.tables import Column, headline, markdown
+from forestrl.publishing.statements import findings, reproduction, summary, verdict
+from forestrl.publishing.tables import differences, endings, forests, headline, learning, short
+from forestrl.statistics import Interval
+from forestrl.tables import Column, markdown
 from tests.publishing.folders import write_evaluation, write_training
 
 
@@ -21,9 +19,9 @@ def cells(table, label):
 
 
 def test_markdown():
-    assert markdown(["a", "b"], [["x", "1"], ["y", "2"]]) == (
-        "| a | b |\n| --- | ---: |\n| x | 1 |\n| y | 2 |\n"
-    )
+    table = markdown(["a", "b"], [["x", "1"], ["y", "2"]])
+    assert cells(table, "x") == {"a": "x", "b": "1"} and cells(table, "y")["b"] == "2"
+    assert table.splitlines()[1].replace("-", "") == "|:|:|"  # the first to the left
 
 
 @pytest.mark.parametrize(
@@ -56,7 +54,17 @@ def test_headline_sets_the_paper_beside_ours_and_marks_the_best(tmp_path):
     assert ours["interventions"] == "**10.0 ± 1.0**"
     assert ours["steps to 98 %"] == "**400 ± 10** (100 %)"
     assert "**" not in "".join(cells(table, "hindsight (sees the whole forest)").values())
-    assert table.splitlines()[-1].startswith("| `my_planner` |")
+    assert table.splitlines()[-1].startswith("| `my_planner`")
+
+
+def test_the_short_table_has_the_policies_that_the_catalogue_names(tmp_path):
+    for name in ("learned", "learned_mode", "nearest_frontier", "random"):
+        write_evaluation(tmp_path, name=name)
+    table = short(read_results(tmp_path))
+    assert [line.split("|")[1].strip() for line in table.splitlines()[2:]] == [
+        "GATv2 and PPO",
+        "nearest frontier",
+    ]
 
 
 def test_a_method_of_several_seeds_has_a_row_over_seeds_and_one_of_its_checkpoint(tmp_path):
@@ -77,9 +85,9 @@ def test_a_method_of_several_seeds_has_a_row_over_seeds_and_one_of_its_checkpoin
         (Interval(0.75, 0.74, 0.76), 0.80, "≥", "no: −5.0"),
         (Interval(0.05, 0.04, 0.06), 0.10, "≤", "yes"),
         (Interval(0.12, 0.11, 0.13), 0.10, "≤", "no: +2.0"),
-        (Interval(0.90, 0.89, 0.91), 0.88, "", "no: +2.0"),
+        (Interval(0.90, 0.89, 0.91), 0.88, "=", "no: +2.0"),
         (Interval(0.88), 0.90, "≥", "no: −2.0"),
-        (Interval(0.88), 0.88, "", "within the interval"),
+        (Interval(0.88), 0.88, "=", "within the interval"),
     ],
 )
 def test_verdicts(value, share, kind, text):
@@ -182,7 +190,12 @@ def test_a_benchmark_that_ends_where_the_papers_does_holds(tmp_path):
 
 @pytest.mark.parametrize(
     ("theirs", "step"),
-    [((0.4, 0.5, 0.9), 500), ((0.4, 0.6, 0.9), 0), ((0.5, 0.6, 0.9), None), ((0, 0.9, 0), None)],
+    [
+        ((0.4, 0.5, 0.9), 1166),  # 0.1 ahead at 500, 0.2 behind at 2500: even a third of the way
+        ((0.4, 0.6, 0.9), 499),
+        ((0.5, 0.6, 0.9), None),
+        ((0, 0.9, 0), None),
+    ],
 )
 def test_the_last_step_ahead(tmp_path, theirs, step):
     folders = [write_evaluation(tmp_path, name=name) for name in ("learned", "random")]
@@ -206,7 +219,8 @@ def test_trainings_of_both_networks_are_set_side_by_side(tmp_path):
 
     write("training", 0, 10, 50), write("training", 1, 30, 70)
     write("training_pyg", 0, 20, 80), write("training_pyg", 1, 40, 90)
-    rows = [line.strip("| ").split(" | ") for line in learning(read_results(tmp_path)).splitlines()]
+    lines = learning(read_results(tmp_path)).splitlines()
+    rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in lines]
     returns = ["rollout/return", "0 to 12,800", "20 (10 to 30)", "30 (20 to 40)", "yes"]
     assert rows[2] == returns  # updates at 1000, 2000, ... frames
     assert rows[3][1:] == ["12,800 to 25,600", "60 (50 to 70)", "85 (80 to 90)", "no"]

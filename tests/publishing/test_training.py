@@ -1,15 +1,16 @@
 """Fig. 3a's curve: smoothing and scaling by hand."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from forestrl.publishing.files import ResultError
+from forestrl.evaluation.reading import ResultError
+from forestrl.publishing.figures import returns, smoothed
 from forestrl.publishing.results import Training
-from forestrl.publishing.training import returns, smoothed
 
 
 def training(frames, values):
-    return Training("metrics.csv", {"frames": np.array(frames), "rollout/return": np.array(values)})
+    return Training("metrics.csv", pd.DataFrame({"frames": frames, "rollout/return": values}))
 
 
 def test_smoothing_keeps_a_line_and_flattens_a_wave():
@@ -21,13 +22,13 @@ def test_smoothing_keeps_a_line_and_flattens_a_wave():
 
 def test_the_mean_over_seeds_spans_zero_to_one():
     x = np.arange(1000.0, 50_001.0, 1000.0)
-    curve = returns([training(x, x), training(x, x + 2000)])
-    assert curve.mean[0] == 0 and curve.mean[-1] == 1
-    assert (curve.high - curve.low) * 49_000 == pytest.approx(np.full(200, 2000.0))
+    _, mean, low, high = returns([training(x, x), training(x, x + 2000)])
+    assert mean[0] == 0 and mean[-1] == 1
+    assert (high - low) * 49_000 == pytest.approx(np.full(200, 2000.0))
 
 
 def test_updates_without_a_finished_episode_are_left_out():
     x = np.array([1000.0, 2000.0, 3000.0])
-    assert returns([training(x, [1.0, np.nan, 3.0])]).frames[-1] == 3000
+    assert returns([training(x, [1.0, np.nan, 3.0])])[0][-1] == 3000
     with pytest.raises(ResultError, match="fewer than two rows"):
         returns([training(x, [1.0, np.nan, np.nan])])

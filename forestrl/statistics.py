@@ -1,8 +1,9 @@
-"""Means with 95 % bootstrap intervals: over arenas, over training seeds, and of differences."""
+"""Means with 95 % intervals: over arenas, over training seeds, and of paired differences."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 _RESAMPLES, _SEED, _BATCH = 2000, 0, 10**6
+_NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
 
 class Interval(NamedTuple):
@@ -67,6 +69,25 @@ def mean_interval(values: Any) -> Interval | None:
     return Interval(*(float(part) for part in bootstrap(values)))
 
 
+def normal_interval(values: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Gives the mean of shares over the first axis with a normal interval.
+
+    It is mean ± 1.96 standard errors, cut to [0, 1]; of thousands of means, such as those of a
+    curve, it is far cheaper than a bootstrap.
+
+    Args:
+        values: shares, ``[n, ...]``.
+
+    Returns:
+        mean, low and high, each float64 ``[...]``; low and high are nan if n = 1.
+    """
+    mean = values.mean(0, dtype=np.float64)
+    if len(values) == 1:
+        return mean, np.full_like(mean, np.nan), np.full_like(mean, np.nan)
+    margin = _NORMAL_95 * values.std(0, dtype=np.float64, ddof=1) / np.sqrt(len(values))
+    return mean, np.maximum(mean - margin, 0.0), np.minimum(mean + margin, 1.0)
+
+
 class Difference(NamedTuple):
     """Mean of a paired difference over the arenas that count, and how many those are."""
 
@@ -79,7 +100,7 @@ class Difference(NamedTuple):
         return int(self.interval.low > 0) - int(self.interval.high < 0)
 
 
-def paired_difference(first: dict[int, float], second: dict[int, float]) -> Difference | None:
+def paired_difference(first: Mapping[int, float], second: Mapping[int, float]) -> Difference | None:
     """Compares two policies on the same arenas: first minus second.
 
     Args:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from forestrl.publishing.statistics import Interval, bootstrap, mean_interval, paired_difference
+from forestrl.statistics import Interval, bootstrap, mean_interval, paired_difference
 
 
 def test_a_constant_has_an_interval_of_width_zero():
