@@ -1,4 +1,4 @@
-"""Each compiled function beside the reference that it stands for."""
+"""Each compiled function beside the reference that it stands for, on the CPU."""
 
 from __future__ import annotations
 
@@ -29,14 +29,15 @@ def compiled(worlds: TensorDict, room: int) -> Iterator[list[Stage]]:
         the versions of one function; a call works on all explored worlds, whose graphs have
         ``room`` for all frontiers, or on as many graphs as a minibatch.
     """
-    trees, cells, position = worlds[K.TREES], worlds[K.CELLS], worlds[K.POSITION]
+    trees, cells, position = (worlds[key].cpu() for key in (K.TREES, K.CELLS, K.POSITION))
     reached, lines = kernels.component(~trees, position), F.sight_lines(_LIDAR_RANGE)
+    free = cells == F.Cell.FREE
     settings = {"window": WINDOW, "max_frontiers": room, "lidar_range": _LIDAR_RANGE}
     calls: dict[str, Callable[[Any], object]] = {
         "sense": lambda f: f.sense(trees, reached, cells, position, lines),
         "exploration_graph": lambda f: f.exploration_graph(cells, position, **settings),
         "potential": lambda f: f.potential(cells, position, window=WINDOW, beta=_BETA),
-        "path_lengths": lambda f: f.path_lengths(cells == F.Cell.FREE, position),
+        "path_lengths": lambda f: f.path_lengths(free, position),
         "component": lambda f: f.component(~trees, position),
         "largest_component": lambda f: f.largest_component(~trees),
     }

@@ -81,7 +81,7 @@ def known(measured: Measurement) -> dict[str, Any]:
 
 
 def to_csv(measured: Sequence[Measurement]) -> str:
-    """Returns a row for each measurement: times of a frame in seconds, empty where unknown."""
+    """Returns a row for each measurement: a frame's median time and quartile distance, seconds."""
     rows: list[list[Any]] = [_COLUMNS]
     for each in measured:
         row = {**known(each), "seconds": each.median, "iqr": each.iqr}
