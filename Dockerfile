@@ -1,6 +1,8 @@
 # docker build -t forestrl .
-# docker run --rm forestrl eval
-# docker run --rm -v "$PWD/outputs:/runs" --user "$(id -u):$(id -g)" forestrl train
+# docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/work" forestrl train env.n_trees=75
+#
+# The mounted folder is the working folder: outputs/, multirun/ and the paths on the command line are
+# those of this folder, as without Docker. Without -v, results stay in the container.
 
 FROM python:3.11-slim-bookworm AS wheel
 WORKDIR /src
@@ -33,18 +35,17 @@ ENV HOME=/home/forestrl \
     MPLBACKEND=Agg \
     MPLCONFIGDIR=/home/forestrl/matplotlib \
     NUMBA_CACHE_DIR=/home/forestrl/numba \
-    PYTHONUNBUFFERED=1 \
-    WANDB_DIR=/runs
-WORKDIR /runs
+    PYTHONUNBUFFERED=1
+WORKDIR /work
 
 # Compile the kernels and list the fonts once, here, and not at the start of every container.
 RUN mkdir --parents "${MPLCONFIGDIR}" "${NUMBA_CACHE_DIR}" \
  && forestrl train experiment=smoke hydra.run.dir=/tmp/smoke \
  && python -c "import matplotlib.font_manager" \
- && rm -rf /tmp/smoke /runs/* \
- && chmod -R a+rwX "${HOME}" /runs
+ && rm -rf /tmp/smoke /work/* \
+ && chmod -R a+rwX "${HOME}" /work
 
-VOLUME /runs
+COPY docker/entrypoint.sh /usr/local/bin/entrypoint
 USER 10001:10001
-ENTRYPOINT ["forestrl"]
+ENTRYPOINT ["entrypoint"]
 CMD ["--help"]

@@ -17,7 +17,7 @@ from forestrl.command import asked_for, command
 from forestrl.evaluation.episodes import Episodes, evaluate
 from forestrl.evaluation.metrics import eval_metrics
 from forestrl.evaluation.parts import Parts
-from forestrl.evaluation.picture import draw_episode
+from forestrl.evaluation.picture import Player, draw_episode
 from forestrl.evaluation.report import table, write_report
 from forestrl.loggers import Logger, NoLogger
 from forestrl.paper import coverage_of
@@ -111,8 +111,7 @@ def log(
         logger.log_figure("eval/interventions", folder / "interventions.png", step=0)
     logger.log_table("eval/episodes", folder / "episodes.csv")
     draw_episode(
-        build.make_env(cfg, 1, policy),
-        policy,
+        {cfg.policy.name: Player(build.make_env(cfg, 1, policy), policy)},
         picture,
         seed=settings.seed,
         arena=settings.first,

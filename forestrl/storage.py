@@ -8,16 +8,37 @@ import math
 import numbers
 import os
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
+
+
+@contextmanager
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """Opens a file to be written piece by piece: it appears when the block ends.
+
+    The data goes to a hidden file beside the target, on the disk, and then takes its place. If that
+    fails, or the block raises, the old file stays and the hidden one is removed.
+
+    Args:
+        path: the file, in a folder that exists.
+    """
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        with part.open("xb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def atomic_write(path: str | os.PathLike[str], data: str | bytes) -> Path:
     """Writes a file in one go: readers see the old content or the new, never a part.
-
-    The data goes to a hidden file beside the target, on the disk, and then takes its place. If that
-    fails, the old file stays and the hidden one is removed.
 
     Args:
         path: the file, in a folder that exists.
@@ -26,18 +47,9 @@ def atomic_write(path: str | os.PathLike[str], data: str | bytes) -> Path:
     Returns:
         the path.
     """
-    path = Path(path)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        with part.open("xb") as file:
-            file.write(data.encode() if isinstance(data, str) else data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-    return path
+    with atomic_file(path) as file:
+        file.write(data.encode() if isinstance(data, str) else data)
+    return Path(path)
 
 
 def csv_text(rows: Iterable[Sequence[Any]]) -> str:

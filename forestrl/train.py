@@ -16,7 +16,7 @@ from forestrl import build
 from forestrl.command import asked_for, command
 from forestrl.evaluation.episodes import evaluate
 from forestrl.evaluation.metrics import eval_metrics
-from forestrl.evaluation.picture import draw_episode
+from forestrl.evaluation.picture import Player, draw_episode
 from forestrl.learning.checkpoint import (
     load_training,
     restore_training,
@@ -107,9 +107,9 @@ class Training:
     def draw(self, logger: Any) -> None:
         """Draws an episode in the first of the fixed arenas."""
         cfg, path = self.cfg.eval, self.run_dir / "episode.gif"
-        env = build.make_env(self.cfg, num_envs=1)
         steps = min(cfg.steps, 500)
-        draw_episode(env, self.policy, path, seed=cfg.seed, arena=0, steps=steps, every=5)
+        player = Player(build.make_env(self.cfg, num_envs=1), self.policy)
+        draw_episode({"policy": player}, path, seed=cfg.seed, arena=0, steps=steps, every=5)
         logger.log_figure("eval/episode", path, step=self.frames)
 
     def save(self, alias: str, logger: Any) -> None:

@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from forestrl.storage import atomic_write
+from forestrl.storage import atomic_file, atomic_write
 
 
 def test_text_is_written_as_utf_8(tmp_path):
@@ -50,3 +50,20 @@ def test_an_interruption_leaves_the_old_file_and_no_part(tmp_path, monkeypatch, 
 def test_a_missing_folder_is_an_error(tmp_path):
     with pytest.raises(FileNotFoundError):
         atomic_write(tmp_path / "none" / "a", "x")
+
+
+def test_a_file_written_in_pieces_appears_when_it_is_whole(tmp_path):
+    (tmp_path / "a").write_text("old")
+    with atomic_file(tmp_path / "a") as file:
+        for piece in (b"new ", b"and ", b"longer"):
+            file.write(piece)
+            assert (tmp_path / "a").read_text() == "old"
+    assert (tmp_path / "a").read_text() == "new and longer"
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_a_file_whose_writing_breaks_off_leaves_no_part(tmp_path):
+    with pytest.raises(KeyboardInterrupt), atomic_file(tmp_path / "a") as file:
+        file.write(b"half")
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())

@@ -1,7 +1,8 @@
-"""A square of coloured cells to draw on, and the colours."""
+"""Coloured cells to draw on, and the colours."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,12 +10,15 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 # After Okabe and Ito, for readers who see few colours; waypoints differ in shape as well.
-INK, PAPER, FAINT = (38, 38, 38), (255, 255, 255), (128, 128, 128)
+INK, PAPER, FAINT, PALE = (38, 38, 38), (255, 255, 255), (128, 128, 128), (200, 200, 200)
 GROUND, TRUNK = (243, 239, 230), (84, 68, 54)
 UNKNOWN, FREE, OCCUPIED = (189, 189, 189), (255, 255, 255), (60, 60, 60)
-AGENT, FRONTIER, MARK = (0, 114, 178), (230, 159, 0), (190, 60, 140)
-EDGE = (148, 148, 148)
-FEASIBLE, INFEASIBLE = (0, 158, 115), (178, 24, 43)
+SOLID = (150, 150, 150)  # what is occupied, at large
+VEILED = (166, 156, 146)  # a trunk that is unknown yet
+AGENT, FRONTIER = (0, 114, 178), (230, 159, 0)
+INTERVENTION, COLLISION = (190, 60, 140), (178, 24, 43)
+EDGE = (140, 140, 140)
+FEASIBLE, INFEASIBLE = (0, 158, 115), COLLISION
 
 Colour = tuple[int, ...]
 """Red, green and blue, 0 to 255, and maybe opacity."""
@@ -85,6 +89,13 @@ class Panel:
         """Draws a filled diamond; ``radius`` in cells."""
         (x, y), r = self._xy(point), radius * self.unit
         self.pen.polygon([(x - r, y), (x, y - r), (x + r, y), (x, y + r)], fill=colour)
+
+    def star(self, point: Point, radius: float, colour: Colour) -> None:
+        """Draws a filled star of five points; ``radius`` in cells."""
+        (x, y), r = self._xy(point), radius * self.unit
+        corners = [(r if i % 2 == 0 else 0.42 * r, math.pi * i / 5) for i in range(10)]
+        xy = [(x + far * math.sin(turn), y - far * math.cos(turn)) for far, turn in corners]
+        self.pen.polygon(xy, fill=colour)
 
     def border(self, point: Point, colour: Colour, width: float) -> None:
         """Draws the border of a cell, on its inside, ``width`` pixels thick."""

@@ -115,7 +115,7 @@ def broken(folder, file, old, new):
         (lambda f: (f / "summary.json").write_text("{"), "summary.json is not valid JSON"),
         (lambda f: (f / "summary.json").write_text("[]"), "summary.json lacks arenas"),
         (lambda f: (f / "episodes.csv").write_text(""), "episodes.csv cannot be read: No columns"),
-        (lambda f: broken(f, "episodes.csv", "0,0.9", "0,high"), "line 2: coverage is 'high', no number"),
+        (lambda f: broken(f, "episodes.csv", "0,0.9", "0,high"), "line 2: coverage is 'high'"),
         (lambda f: broken(f, "episodes.csv", "1,0.8", "1,0.8,7"), "cannot be read: Error token"),
         (lambda f: broken(f, "summary.json", '"arenas": 2', '"arenas": 3'), "has 2 rows"),
         (lambda f: broken(f, "summary.json", '"n_trees": 45', '"n_trees": 60'),
