@@ -2,71 +2,92 @@
 
 from __future__ import annotations
 
+import itertools
+import json
+import math
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import torch
 from hydra.core.hydra_config import HydraConfig
-from hydra.utils import instantiate
-from omegaconf import DictConfig, OmegaConf
-from torchrl.collectors import Collector
-from torchrl.envs import Compose, TransformedEnv
+from omegaconf import DictConfig, ListConfig, OmegaConf
+from torch.utils.benchmark import Compare, Measurement
+from torchrl.envs import Transform
 from tqdm.auto import tqdm
 
 from forestrl import build
-from forestrl.benchmark.compiled import measure_compiled, write_compiled
 from forestrl.benchmark.machine import describe_machine
-from forestrl.benchmark.report import write_report
-from forestrl.benchmark.run import Makers, explore_all, run
-from forestrl.benchmark.scaling import measure_scaling, write_scaling
-from forestrl.benchmark.stages import Parts
+from forestrl.benchmark.measuring import known, to_csv
+from forestrl.benchmark.run import describe, measure_arenas, measure_one
+from forestrl.benchmark.scaling import growth
+from forestrl.benchmark.stages import Setup
+from forestrl.benchmark.states import explore
 from forestrl.command import asked_for, command
-from forestrl.envs import ForestEnv
+from forestrl.planner import Planner
+from forestrl.storage import atomic_write
 
-_STAGES = {"+ filter": "safety", "+ graph": "graph", "+ reward": "reward"}
+_POOL = 64  # arenas explored of each size; larger batches repeat them
+_TRANSFORMS = {"+ filter": "safety", "+ graph": "graph", "+ reward": "reward"}
 
 
-def resized(cfg: DictConfig, size: int, num_envs: int, max_frontiers: int = 1) -> DictConfig:
-    """Gives the configuration for another arena side, with trunks in proportion to the area."""
-    n_trees = round(cfg.env.n_trees * size**2 / cfg.env.size**2)
+def resized(cfg: DictConfig, size: Any, num_envs: int, room: int = 1) -> DictConfig:
+    """Gives the configuration for other arenas, with trunks in proportion to the area.
+
+    Args:
+        cfg: the whole configuration; it is not changed.
+        size: side or sides, cells; None for a world that has no such setting.
+        num_envs: arenas stepped at once.
+        room: for frontiers; the configuration's if that is more.
+    """
     changed = cfg.copy()
-    OmegaConf.update(changed, "env", {"size": size, "n_trees": n_trees, "num_envs": num_envs})
-    OmegaConf.update(changed, "graph.max_frontiers", max_frontiers)
+    OmegaConf.update(changed, "env.num_envs", num_envs)
+    if size is not None:
+        n_trees = round(cfg.env.n_trees * _area(size) / _area(cfg.env.size))
+        OmegaConf.update(changed, "env", {"size": size, "n_trees": n_trees})
+    if "max_frontiers" in cfg.graph:
+        most = max(room, cfg.graph.max_frontiers)
+        OmegaConf.update(changed, "graph.max_frontiers", most)
     return changed
 
 
-def make_forest(cfg: DictConfig, size: int, num_envs: int) -> ForestEnv:
-    """Builds the bare forest."""
-    return instantiate(resized(cfg, size, num_envs).env)
+def _area(size: Any) -> int:
+    return size**2 if isinstance(size, int) else math.prod(size)
 
 
-def make_parts(cfg: DictConfig, size: int, num_envs: int, max_frontiers: int) -> Parts:
+def make_setup(cfg: DictConfig) -> Setup:
     """Builds what one size and number of arenas is measured with."""
-    cfg = resized(cfg, size, num_envs, max_frontiers)
-    chosen = {stage: cfg[group] for stage, group in _STAGES.items() if cfg[group].get("_target_")}
-    nodes = list(chosen.values())
-    envs = {"env step": instantiate(cfg.env)}
-    for count, stage in enumerate(chosen, 1):
-        transforms = Compose(*map(instantiate, nodes[:count]))
-        envs[stage] = TransformedEnv(instantiate(cfg.env), transforms)
-    networks = build.make_networks(cfg)
-    ppo = instantiate(cfg.algo, networks.make_actor(), networks.make_critic())
-
-    def make_collector() -> Collector:
-        return build.make_collector(cfg, build.make_training_env(cfg), ppo.actor)
-
-    divides = cfg.algo.frames_per_batch % num_envs == 0
-    return Parts(envs, build.make_env(cfg), networks, ppo, make_collector if divides else None)
+    env, networks = build.make_training_env(cfg), build.make_networks(cfg)
+    ppo, observe = build.make_ppo(cfg, networks), build.make_observation(cfg)
+    divides = cfg.algo.frames_per_batch % cfg.env.num_envs == 0
+    outside = type(observe).forward is not Transform.forward  # it works without an env
+    return Setup(
+        training=env,
+        transforms=[name for name, group in _TRANSFORMS.items() if cfg[group].get("_target_")],
+        networks=networks,
+        ppo=ppo,
+        make_collector=partial(build.make_collector, cfg, env, ppo.actor) if divides else None,
+        planner=Planner(networks.make_policy(), observe) if outside else None,
+    )
 
 
-def cells(cfg: DictConfig, asked: set[str]) -> tuple[list[int], list[int]]:
-    """Gives arena sides and numbers of arenas; ``env.size`` and ``env.num_envs`` ask for one."""
+def grids(cfg: DictConfig, asked: set[str]) -> tuple[list[Any], list[Any]]:
+    """Gives sizes with numbers of arenas: where all is measured, and where steps alone are.
+
+    ``env.size`` and ``env.num_envs`` ask for one, ``env`` for one of both.
+    """
     chosen = []
     for name, ours in (("size", "sizes"), ("num_envs", "num_envs")):
-        single = {"env", f"env.{name}"} & asked and f"bench.{ours}" not in asked
-        chosen.append([cfg.env[name]] if single else list(cfg.bench[ours]))
-    return chosen[0], chosen[1]
+        single = name not in cfg.env or ({"env", f"env.{name}"} & asked and ours not in asked)
+        chosen.append([cfg.env.get(name)] if single else list(cfg.bench[ours]))
+    sizes = [tuple(size) if isinstance(size, ListConfig) else size for size in chosen[0]]
+    whole = list(itertools.product(sizes, chosen[1]))
+    if not cfg.bench.scaling or "size" not in cfg.env:
+        return whole, []
+    steps = itertools.product(cfg.bench.scaling_sizes, cfg.bench.scaling_num_envs)
+    return whole, [each for each in steps if each not in whole]
 
 
 def check(cfg: DictConfig) -> None:
@@ -86,34 +107,67 @@ def check(cfg: DictConfig) -> None:
             )
 
 
-def measure(cfg: DictConfig, folder: Path) -> list[str]:
-    """Measures all that is asked for, with a bar on a terminal; returns the tables."""
-    settings, (sizes, num_envs) = cfg.bench, cells(cfg, asked_for())
-    makers = Makers(
-        forest=partial(make_forest, cfg),
-        parts=partial(make_parts, cfg),
-        steps=min(cfg.episode_steps, cfg.env.max_steps),
-        max_frontiers=cfg.graph.max_frontiers,
-        window=cfg.graph.window,
-    )
-    more = (list(settings.scaling_sizes), list(settings.scaling_num_envs))
-    total = len(sizes) * (len(num_envs) + 2) + settings.scaling * len(more[0]) * len(more[1])
-    about = describe_machine() | {"kernel": cfg.model.kernel, "device": cfg.device}
-    with tqdm(total=total, disable=not sys.stderr.isatty()) as bar:
+def measure(cfg: DictConfig) -> list[Measurement]:
+    """Measures all that is asked for, small arenas first, with a bar on a terminal."""
+    whole, steps = grids(cfg, asked_for())
+    worlds, facts = {}, {}
+    for size in dict.fromkeys(size for size, _ in whole + steps):
+        changed = resized(cfg, size, _POOL)
+        worlds[size] = explore(
+            build.make_forest(changed), min(cfg.episode_steps, cfg.env.max_steps)
+        )
+        facts[size] = {"n_trees": changed.env.get("n_trees"), **describe(worlds[size])}
+    jobs: list[tuple[Any, int, Callable[..., list[Measurement]]]] = [
+        (size, n, partial(measure_arenas, learning=(size, n) in whole)) for size, n in whole + steps
+    ]
+    jobs.sort(key=lambda job: facts[job[0]]["rows"] * facts[job[0]]["columns"] * job[1])
+    jobs += [(size, 1, measure_one) for size in dict(whole)]
+    measured = []
+    with tqdm(jobs, disable=not sys.stderr.isatty()) as bar:
+        for size, arenas, job in bar:
+            about = {**facts[size], "num_envs": arenas}
+            bar.set_description(f"{arenas} of {about['rows']} x {about['columns']}")
+            setup = make_setup(resized(cfg, size, arenas, about["max_frontiers"]))
+            measured += job(setup, worlds[size], about, cfg.bench.seconds)
+    return measured
 
-        def progress(done: str) -> None:
-            bar.set_description(done)
-            bar.update()
 
-        explored = explore_all(makers, sizes)
-        rows = run(makers, explored, num_envs, settings.seconds, progress)
-        texts = [write_report(rows, about, folder)]
-        gains = measure_compiled(makers, explored, settings.seconds, progress)
-        texts.append(write_compiled(gains, folder))
-        if settings.scaling:
-            costs = measure_scaling(makers, *more, settings.seconds, progress)
-            texts.append(write_scaling(costs, folder))
-    return texts
+def report(measured: Sequence[Measurement], about: Mapping[str, str]) -> str:
+    """Lays out what was measured as plain text.
+
+    Args:
+        measured: all of it.
+        about: machine, threads, versions and settings.
+    """
+    tables = Compare(list(measured))
+    tables.highlight_warnings()
+    head = "\n".join(f"{name:<18}{value}" for name, value in about.items())
+    return "\n\n".join([head, str(tables).strip(), *_notes(measured)])
+
+
+def _notes(measured: Sequence[Measurement]) -> list[str]:
+    """Says what the tables do not show: frames per second, tails, ratios and growth."""
+    compiled = {(m.label, m.sub_label): m.median for m in measured if m.description == "compiled"}
+    notes: dict[str, list[str]] = {}
+    for each in measured:
+        table, stage, column = each.label, each.sub_label, each.description
+        if stage in ("train iteration", "evaluation step"):
+            title, note = f"{stage}, frames/s", f"{column}: {1 / each.median:,.0f}"
+        elif "percentile_99" in known(each):
+            title, note = (
+                "99th percentile, us",
+                f"{stage} {1e6 * known(each)['percentile_99']:.0f}",
+            )
+        elif (table, stage) in compiled and column != "compiled":
+            gain = each.median / compiled[table, stage]
+            title, note = f"compiled beside {column}, times as fast", f"{stage} {gain:.1f}"
+        else:
+            continue
+        notes.setdefault(f"{table}; {title}", []).append(note)
+    if grown := growth(measured):
+        title = "growth of the time of a frame over that of its work, at most"
+        notes[title] = [f"{stage} {value:.2f}" for stage, value in grown.items()]
+    return [f"{title}: {', '.join(values)}" for title, values in notes.items()]
 
 
 @command("bench")
@@ -124,7 +178,16 @@ def main(cfg: DictConfig) -> None:
     check(cfg)
     build.make_output_folder(folder)
     torch.manual_seed(cfg.seed)
-    print("\n\n".join([*measure(cfg, folder), f"results: {folder}"]))
+    about = describe_machine() | {"kernel": cfg.model.get("kernel", "-"), "device": cfg.device}
+    frames = cfg.algo.frames_per_batch
+    if odd := sorted({arenas for _, arenas in grids(cfg, asked_for())[0] if frames % arenas}):
+        about["left out"] = f"learning with {odd} arenas: no part of frames_per_batch={frames}"
+    measured = measure(cfg)
+    text = report(measured, about)
+    atomic_write(folder / "bench.csv", to_csv(measured))
+    atomic_write(folder / "machine.json", json.dumps(about, indent=2) + "\n")
+    atomic_write(folder / "bench.txt", text + "\n")
+    print(f"{text}\n\nresults: {folder}")
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ ROOMS = {  # room: the other rooms it may import from
     "planner": L0 | L1 | L2,
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
-    "benchmark": L0 | L1 | L2 | {"evaluation"},
+    "benchmark": L0 | L1 | L2 | {"planner"},
     "tables": {"statistics"},
     "sweeps": {"evaluation", "statistics", "storage", "tables"},
     "publishing": {"evaluation", "paper", "statistics", "sweeps", "tables"},
