@@ -23,11 +23,9 @@ from forestrl.publishing.drawing import (
 from forestrl.publishing.results import Results, Training
 from forestrl.statistics import bootstrap
 
-STEPS, LONG = 2500, 10_000
-"""Steps of an episode in all figures, and in Fig. 4a."""
+STEPS, LONG = 2500, 10_000  # of an episode in all figures, and in Fig. 4a
 _BIN, _END = 0.01, 0.3  # width of a bin; where the axis of shares ends at the least
-_INSET = 600  # steps that Fig. 3b shows at large
-_SMOOTHED = 20_000  # frames over which returns are averaged
+_INSET, _SMOOTHED = 600, 20_000  # steps that Fig. 3b shows at large; frames that are averaged
 _SIZES, _DENSITIES = ("size50", "size75", "size100"), ("nominal", "trees60", "trees75")
 
 

@@ -39,7 +39,7 @@ def page(
         "forests": tables.forests(results),
         "ablations": ablations,
         "learning": tables.learning(results),
-        "figures": _figures(results, method, drawn, path),
+        "figures": _figures(results, drawn, path),
     }
     parts = [part for part in text("results.md").split("\n## ") if part]
     written = [parts[0]]
@@ -50,8 +50,8 @@ def page(
     return "\n## ".join(written).rstrip() + "\n"
 
 
-def _figures(results: Results, method: str, drawn: Mapping[str, Figure | str], path: Path) -> str:
-    """Every figure with its caption and the commands behind it."""
+def _figures(results: Results, drawn: Mapping[str, Figure | str], path: Path) -> str:
+    """Every figure with its caption and the commands that made its data."""
     parts = []
     for name, figure in drawn.items():
         if not isinstance(figure, Figure):
@@ -59,20 +59,13 @@ def _figures(results: Results, method: str, drawn: Mapping[str, Figure | str], p
         link = Path(
             os.path.relpath(results.folder / FIGURES / f"{name}.png", path.parent)
         ).as_posix()
-        lines = [_draw_command(results, method), *(_data_command(each) for each in figure.sources)]
-        commands, title = "\n".join(dict.fromkeys(lines)), f"Fig. {name.removeprefix('fig')}"
+        lines = dict.fromkeys(_data_command(each) for each in figure.sources)
+        commands, title = "\n".join(lines), f"Fig. {name.removeprefix('fig')}"
         parts.append(
             f'<img src="{link}" width="440" alt="{title}">\n\n**{title}.** {figure.caption}\n\n'
             f"<details><summary>commands</summary>\n\n```bash\n{commands}\n```\n\n</details>\n"
         )
     return "\n".join(parts)
-
-
-def _draw_command(results: Results, method: str) -> str:
-    asked = [] if method == "learned" else [f"method={method}"]
-    if (folder := results.folder.as_posix()) != "multirun/results":
-        asked.append(f"results={folder}")
-    return shlex.join(["forestrl", "figures", *asked])
 
 
 def _data_command(source: Evaluation | Training) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from forestrl.evaluation.reading import Evaluation, Method, paired
 from forestrl.publishing.catalogue import data, forest, label, ordered, policies, ranked, settings
-from forestrl.publishing.results import Results, Training
+from forestrl.publishing.results import Results
 from forestrl.statistics import Interval
 from forestrl.tables import ARRIVAL, Column, markdown
 
@@ -27,8 +27,7 @@ HEADLINE = (
     Column("area to 500", "area_500"),
     Column("area to 2500", "area_2500"),
 )
-SHORT = (HEADLINE[0], HEADLINE[1], HEADLINE[4], ARRIVAL)
-"""The columns of the README's table."""
+SHORT = (HEADLINE[0], HEADLINE[1], HEADLINE[4], ARRIVAL)  # the README's
 _PAIRED = (
     Column("coverage at 500", "coverage_500"),
     Column("coverage at the end", "coverage"),
@@ -176,7 +175,10 @@ def endings(results: Results) -> str:
     """
     heads, elsewhere = data("catalogue")["endings"], data("elsewhere")["endings"]
     lines = []
-    for name, method in ((n, m) for n, m in _nominal(results) if _ends(m)):
+    methods = results.settings.get("nominal", {})
+    for name, method in ((name, methods[name]) for name in ordered(methods)):
+        if not _ends(method):
+            continue
         late = method.column("coverage")[method.column("steps_to_98").isna()]
         left = f"{100 * late.mean():.1f}" if len(late) else "–"
         lines.append((label(name), method.runs, _ends(method), left))
@@ -192,11 +194,6 @@ def endings(results: Results) -> str:
     ]
     head = ["policy", "runs", *(heads[kind] for kind in kinds), "coverage of the others"]
     return markdown(head, rows) if rows else ""
-
-
-def _nominal(results: Results) -> list[tuple[str, Method]]:
-    methods = results.settings.get("nominal", {})
-    return [(name, methods[name]) for name in ordered(methods)]
 
 
 def _ends(method: Method) -> dict[str, float]:
@@ -228,28 +225,25 @@ def forests(results: Results) -> str:
 def learning(results: Results) -> str:
     """Sets trainings with the compiled networks and with PyTorch Geometric's side by side.
 
-    Returns:
-        a Markdown table of every whole window of frames: mean over seeds and, in brackets, the
-        least and the most; empty if there are no trainings of both.
+    Every whole window of frames has a row: mean over seeds and, in brackets, least and most.
     """
-    groups = [list(each.values()) for each in (results.training, results.reference)]
+    groups = [
+        [one.metrics for one in each.values()] for each in (results.training, results.reference)
+    ]
     if not all(groups):
         return ""
-    end = int(min(each.metrics["frames"].max() for group in groups for each in group))
-    rows = []
+    end, rows = int(min(one["frames"].max() for group in groups for one in group)), []
     for name, factor, digits in (("rollout/return", 1.0, 0), ("rollout/coverage", 100.0, 1)):
-        for first in range(0, end - _WINDOW + 1, _WINDOW):
-            means = [[factor * _mean(each, name, first) for each in group] for group in groups]
-            meet = max(map(min, means)) <= min(map(max, means))
+        for first in range(1, end - _WINDOW + 2, _WINDOW):
+            last = first + _WINDOW - 1
+            means = [
+                [factor * one[name][one["frames"].between(first, last)].mean() for one in group]
+                for group in groups
+            ]
             cells = [
                 f"{np.mean(x):.{digits}f} ({min(x):.{digits}f} to {max(x):.{digits}f})"
                 for x in means
             ]
-            span = f"{first:,} to {first + _WINDOW:,}"
-            rows.append([name, span, *cells, "yes" if meet else "no"])
+            meet = "yes" if max(map(min, means)) <= min(map(max, means)) else "no"
+            rows.append([name, f"{first - 1:,} to {last:,}", *cells, meet])
     return markdown(["measure", "frames", "fused", "pyg", "ranges meet"], rows)
-
-
-def _mean(training: Training, name: str, first: int) -> float:
-    frames = training.metrics["frames"]
-    return float(training.metrics[name][(frames > first) & (frames <= first + _WINDOW)].mean())
