@@ -12,25 +12,70 @@ from forestrl.planners.viewpoints.sight import Sight
 from forestrl.planners.viewpoints.views import UNKNOWN, Views
 
 NOWHERE = -1
-PATH_GAIN = np.array([1.4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0])
-"""The weights of the linear score that make it path gain."""
+TERMS = (
+    "log_length",
+    "log_gain",
+    "length",
+    "seen_at_end",
+    "unknown_near",
+    "unknown_around",
+    "known_log_length",
+    "known_unknown_around",
+    "to_border",
+    "at_border",
+    "along_heading",
+    "stay",
+    "gain_per_length",
+    "diagonal",
+)
+"""The terms of the linear score. The weight of ``log_gain`` is 1; the number in its place is the
+logarithm of how much a cell seen at the end counts against one seen on the way."""
 RUNNING = 0.7
 """How much of the heading is kept at a move."""
 
 
 class Memory(NamedTuple):
-    """What the linear score remembers from step to step; written in place."""
+    """What is remembered from step to step; written in place."""
 
     heading: np.ndarray
     """Running sum of the last moves, (row, col), float64 ``[2]``."""
     goal: np.ndarray
     """The goal of the step before as a cell number, int64 ``[1]``; ``NOWHERE`` at the start."""
+    idle: np.ndarray
+    """Unknown cells at the last step, and the steps since there were more, int64 ``[2]``."""
+
+
+class Situation(NamedTuple):
+    """What the terms of all cells have in common."""
+
+    unit: float
+    """A fifth of the sensor's range, cells: the unit of lengths."""
+    row: int
+    """The robot's, on the flat map."""
+    col: int
+    """The robot's, on the flat map."""
+    last_row: int
+    """Of the flat map."""
+    last_col: int
+    """Of the flat map."""
+    margin: int
+    """Of the flat map."""
+    near: int
+    """Reach of the smaller window, cells."""
+    far: int
+    """Reach of the larger window, cells."""
+    known: float
+    """Share of the cells that are known."""
+    pace: float
+    """Length of the heading."""
+    sums: np.ndarray
+    """Unknown cells above and to the left, int32 ``[rows + 1, cols + 1]``."""
 
 
 @njit(cache=True)
 def no_memory() -> Memory:
     """Gives the memory before the first step."""
-    return Memory(np.zeros(2), np.full(1, NOWHERE, np.int64))
+    return Memory(np.zeros(2), np.full(1, NOWHERE, np.int64), np.zeros(2, np.int64))
 
 
 @njit(cache=True)
@@ -63,6 +108,12 @@ def in_window(sums: np.ndarray, row: int, col: int, reach: int) -> int:
 
 
 @njit(cache=True)
+def window_share(sums: np.ndarray, row: int, col: int, reach: int) -> float:
+    """Gives the share of unknown cells in a window; what lies outside the map is known."""
+    return in_window(sums, row, col, reach) / (2 * reach + 1) ** 2
+
+
+@njit(cache=True)
 def path_gain(views: Views, paths: Paths, power: float) -> int:
     """Finds the cell with the most to be seen on the way and at the end, for its path length.
 
@@ -80,68 +131,112 @@ def path_gain(views: Views, paths: Paths, power: float) -> int:
 
 
 @njit(cache=True)
-def highest(paths: Paths, scores: np.ndarray) -> int:
-    """Gives the cell with the highest score, ties to the lowest number; ``NOWHERE`` if none."""
-    best, best_score = NOWHERE, -np.inf
-    for i in range(1, len(scores)):
-        cell = paths.order[i]
-        if scores[i] > best_score or (scores[i] == best_score and cell < best):
-            best, best_score = cell, scores[i]
-    return best
+def situation(
+    views: Views, sight: Sight, stride: int, source: int, heading: np.ndarray
+) -> Situation:
+    """Gathers what the terms of all cells have in common."""
+    unit, margin = sight.lidar_range / 5, sight.margin
+    sums = unknown_sums(views.grid, stride)
+    last_row, last_col = len(views.grid) // stride - 1, stride - 1
+    return Situation(
+        unit,
+        source // stride,
+        source % stride,
+        last_row,
+        last_col,
+        margin,
+        int(np.rint(3 * unit)),
+        int(np.rint(10 * unit)),
+        1 - sums[-1, -1] / ((last_row + 1 - 2 * margin) * (last_col + 1 - 2 * margin)),
+        np.hypot(heading[0], heading[1]),
+        sums,
+    )
+
+
+@njit(cache=True)
+def put_terms(
+    views: Views,
+    stride: int,
+    paths: Paths,
+    memory: Memory,
+    here: Situation,
+    ends: float,
+    cell: int,
+    out: np.ndarray,
+) -> None:
+    """Writes the terms of a cell.
+
+    Args:
+        views: the map and what could be seen.
+        stride: of the map.
+        paths: from the robot.
+        memory: heading and last goal.
+        here: what is common to all cells.
+        ends: how much a cell seen at the end counts against one seen on the way.
+        cell: its number.
+        out: the terms; written, float64 ``[14]``.
+    """
+    unit = here.unit
+    gain, end, length = paths.gains[cell], views.counts[cell], float(paths.lengths[cell])
+    r, c = cell // stride, cell % stride
+    log_length = np.log(length)
+    around = window_share(here.sums, r, c, here.far)
+    border = min(min(r, here.last_row - r), min(c, here.last_col - c)) - here.margin
+    dr, dc = r - here.row, c - here.col
+    out[0] = -log_length
+    out[1] = np.log(gain + ends * end)
+    out[2] = length / (10 * unit)
+    out[3] = end / (20 * unit * unit)
+    out[4] = window_share(here.sums, r, c, here.near)
+    out[5] = around
+    out[6] = here.known * log_length
+    out[7] = here.known * around
+    out[8] = border / (10 * unit)
+    out[9] = 1.0 if border <= 5 * unit else 0.0
+    out[10], out[11] = 0.0, 0.0
+    if here.pace > 0:
+        along = dr * memory.heading[0] + dc * memory.heading[1]
+        out[10] = along / (here.pace * np.sqrt(float(dr * dr + dc * dc)))
+    goal = memory.goal[0]
+    if goal != NOWHERE:
+        away = max(abs(r - goal // stride), abs(c - goal % stride))
+        out[11] = 1 / (1 + away / unit)
+    out[12] = gain / length / (10 * unit)
+    out[13] = 1.0 if abs(dr) == abs(dc) else 0.0
+
+
+@njit(cache=True)
+def weighed(terms: np.ndarray, weights: np.ndarray) -> float:
+    """Gives the linear score of a cell's terms."""
+    score = terms[1]
+    for i in range(len(weights)):
+        if i != 1:
+            score += weights[i] * terms[i]
+    return score
 
 
 @njit(cache=True)
 def linear(
-    views: Views, sight: Sight, stride: int, paths: Paths, memory: Memory, w: np.ndarray
+    views: Views, stride: int, paths: Paths, memory: Memory, here: Situation, weights: np.ndarray
 ) -> np.ndarray:
     """Gives every cell within reach its linear score.
 
-    Lengths are taken in units of a fifth of the sensor's range.
-
     Args:
         views: the map and what could be seen.
-        sight: lines of sight.
         stride: of the map.
         paths: from the robot.
         memory: heading and last goal.
-        w: the fourteen weights.
+        here: what is common to all cells.
+        weights: of the terms, float64 ``[14]``.
 
     Returns:
         the scores, in the order of ``paths.order``; minus infinity where nothing is to be seen.
     """
-    unit = sight.lidar_range / 5
-    near, far = int(np.rint(3 * unit)), int(np.rint(10 * unit))
-    sums = unknown_sums(views.grid, stride)
-    last = len(views.grid) // stride - 1
-    margin, source = sight.margin, paths.order[0]
-    known = 1 - sums[-1, -1] / ((last + 1 - 2 * margin) * (stride - 2 * margin))
-    row, col = source // stride, source % stride
-    pace = np.hypot(memory.heading[0], memory.heading[1])
-    goal = memory.goal[0]
-    log_ends = np.exp(w[1])
-    scores = np.full(len(paths.order), -np.inf)
+    scores, terms = np.full(len(paths.order), -np.inf), np.empty(len(weights))
+    ends = np.exp(weights[1])
     for i in range(1, len(paths.order)):
         cell = paths.order[i]
-        gain, end, length = paths.gains[cell], views.counts[cell], float(paths.lengths[cell])
-        if gain == 0:
-            continue
-        r, c = cell // stride, cell % stride
-        log_length = np.log(length)
-        score = np.log(gain + log_ends * end) + (w[6] * known - w[0]) * log_length
-        score += w[2] * length / (10 * unit) + w[3] * end / (20 * unit * unit)
-        score += w[4] * in_window(sums, r, c, near) / (2 * near + 1) ** 2
-        around = in_window(sums, r, c, far) / (2 * far + 1) ** 2
-        score += (w[5] + w[7] * known) * around
-        border = min(min(r, last - r), min(c, stride - 1 - c)) - margin
-        score += w[8] * border / (10 * unit) + (w[9] if border <= 5 * unit else 0.0)
-        dr, dc = r - row, c - col
-        if pace > 0:
-            along = dr * memory.heading[0] + dc * memory.heading[1]
-            score += w[10] * along / (pace * np.sqrt(float(dr * dr + dc * dc)))
-        if goal != NOWHERE:
-            away = max(abs(r - goal // stride), abs(c - goal % stride))
-            score += w[11] / (1 + away / unit)
-        score += w[12] * gain / length / (10 * unit)
-        score += w[13] if abs(dr) == abs(dc) else 0.0
-        scores[i] = score
+        if paths.gains[cell] > 0:
+            put_terms(views, stride, paths, memory, here, ends, cell, terms)
+            scores[i] = weighed(terms, weights)
     return scores

@@ -1,0 +1,1 @@
+"""How the explorer and the linear score are trained: whole episodes, compiled."""
