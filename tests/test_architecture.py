@@ -10,7 +10,8 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
 
 L0 = {"functional", "kernels"}
-L1 = {"keys", "paper", "sampling", "statistics", "status", "storage", "progress"}
+L1 = {"keys", "paper", "sampling", "settings", "statistics", "status", "storage"}
+L1 |= {"progress", "wording"}
 L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "benchmark", "sweeps", "tables"}
 L3 = {"config", "command", "loggers", "build"}
@@ -21,6 +22,8 @@ ROOMS = {  # room: the other rooms it may import from
     "kernels": {"functional"},
     **{name: set() for name in L1},
     "sampling": {"keys"},
+    "settings": {"wording"},
+    "signatures": {"settings"},
     **dict.fromkeys(L2, L0 | L1),
     "planner": L0 | L1 | L2,
     "rendering": L0 | L1 | {"envs"},
@@ -31,7 +34,7 @@ ROOMS = {  # room: the other rooms it may import from
     "publishing": {"evaluation", "paper", "statistics", "sweeps", "tables"},
     "config": set(),
     "command": {"config"},
-    "loggers": {"storage"},
+    "loggers": {"settings", "storage"},
     "build": L0 | L1 | L2 | STUDIES | {"config", "loggers"},
     **dict.fromkeys(L4, {""} | L0 | L1 | L2 | STUDIES | L3 | {"planner"}),
     "cli": {""},
@@ -44,8 +47,11 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "keys": {"torch", "tensordict"},
     "sampling": {"torch", "tensordict"},
     "paper": set(),
+    "settings": set(),
+    "signatures": set(),
     "status": set(),
     "storage": set(),
+    "wording": set(),
     "statistics": {"numpy", "scipy"},
     "tables": {"tabulate"},
     "sweeps": {"yaml"},
