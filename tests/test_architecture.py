@@ -24,6 +24,7 @@ ROOMS = {  # room: the other rooms it may import from
     "sampling": {"keys"},
     "settings": {"wording"},
     "signatures": {"settings"},
+    "terminal": set(),
     **dict.fromkeys(L2, L0 | L1),
     "planner": L0 | L1 | L2,
     "rendering": L0 | L1 | {"envs"},
@@ -37,7 +38,8 @@ ROOMS = {  # room: the other rooms it may import from
     "loggers": {"settings", "storage"},
     "build": L0 | L1 | L2 | STUDIES | {"config", "loggers"},
     **dict.fromkeys(L4, {""} | L0 | L1 | L2 | STUDIES | L3 | {"planner"}),
-    "cli": {""},
+    "completion": set(),
+    "cli": {"", "completion", "terminal"},
 }
 LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "": set(),
@@ -51,12 +53,14 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "signatures": set(),
     "status": set(),
     "storage": set(),
+    "terminal": set(),
     "wording": set(),
     "statistics": {"numpy", "scipy"},
     "tables": {"tabulate"},
     "sweeps": {"yaml"},
     "publishing": {"numpy", "pandas", "yaml", "matplotlib"},
     "progress": {"tqdm"},
+    "completion": set(),
     "cli": set(),
 }
 FUNCTIONAL = [  # each row may import from the rows above it
