@@ -14,7 +14,8 @@ L1 = {"keys", "paper", "sampling", "settings", "statistics", "status", "storage"
 L1 |= {"progress", "wording"}
 L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "benchmark", "sweeps", "tables"}
-L3 = {"config", "command", "loggers", "build"}
+L3 = {"config", "command", "loggers", "build", "runs"}
+LIGHT = {"config", "command", "settings", "shared"}
 L4 = {"train", "eval", "render", "collisions", "bench", "figures"}
 ROOMS = {  # room: the other rooms it may import from
     "": set(),
@@ -33,11 +34,15 @@ ROOMS = {  # room: the other rooms it may import from
     "tables": {"statistics"},
     "sweeps": {"evaluation", "statistics", "storage", "tables"},
     "publishing": {"evaluation", "paper", "statistics", "sweeps", "tables"},
-    "config": set(),
-    "command": {"config"},
+    "config": {"settings", "signatures", "wording"},
+    "help": {"config", "settings", "wording"},
+    "runs": set(),
+    "command": {"config", "help", "runs", "settings", "terminal", "wording"},
+    "shared": {"config", "settings"},
     "loggers": {"settings", "storage"},
     "build": L0 | L1 | L2 | STUDIES | {"config", "loggers"},
-    **dict.fromkeys(L4, {""} | L0 | L1 | L2 | STUDIES | L3 | {"planner"}),
+    "jobs": {""} | L0 | L1 | L2 | STUDIES | L3 | {"planner"},
+    **dict.fromkeys(L4, LIGHT | {"jobs"}),
     "completion": set(),
     "cli": {"", "completion", "terminal"},
 }
@@ -53,10 +58,10 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "signatures": set(),
     "status": set(),
     "storage": set(),
-    "terminal": set(),
-    "wording": set(),
     "statistics": {"numpy", "scipy"},
     "tables": {"tabulate"},
+    "terminal": set(),
+    "wording": set(),
     "sweeps": {"yaml"},
     "publishing": {"numpy", "pandas", "yaml", "matplotlib"},
     "progress": {"tqdm"},
