@@ -4,9 +4,14 @@ Importing the package imports nothing else; start from :mod:`forestrl.functional
 equations, :mod:`forestrl.envs` for the environment, or ``forestrl --help`` for the commands.
 """
 
-from importlib.metadata import PackageNotFoundError, version
 
-try:
-    __version__ = version("forestrl")
-except PackageNotFoundError:  # pragma: no cover - a checkout that was never installed
-    __version__ = "0+unknown"
+def __getattr__(name: str) -> str:
+    """Looks the version up when it is asked for: the import for it is slow."""
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("forestrl")
+    except PackageNotFoundError:  # pragma: no cover - a checkout that was never installed
+        return "0+unknown"

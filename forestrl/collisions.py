@@ -2,85 +2,51 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import itertools
-import sys
-from functools import partial
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
-from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, OmegaConf
-from tqdm.auto import tqdm
+from omegaconf import DictConfig
 
-from forestrl import build
-from forestrl.command import asked_for, command
-from forestrl.evaluation.episodes import evaluate
-from forestrl.planners import RandomWalk
-from forestrl.storage import atomic_write
-
-_COLUMNS = ("policy", "filter", "size", "n_trees", "steps", "interventions", "collisions")
+from forestrl.command import command
+from forestrl.settings import Range, not_allowed
+from forestrl.shared import Count, CountOrZero, Seed, Side, WithPolicy
 
 
-def count(cfg: DictConfig, policy: Any, forest: dict[str, int], filtered: bool) -> dict[str, Any]:
-    """Runs a policy in forests of one kind and counts steps, interventions and collisions."""
-    settings, changed = cfg.collisions, cfg.copy()
-    OmegaConf.update(changed, "env", forest)
-    if not filtered:
-        OmegaConf.update(changed, "safety", {"_target_": None}, merge=False)
-    episodes = evaluate(
-        partial(build.make_env, changed, policy=policy),
-        policy,
-        seed=settings.seed,
-        indices=range(settings.arenas),
-        steps=settings.steps,
-        batch=settings.arenas,
-    )
-    return {
-        "filter": "on" if filtered else "off",
-        **forest,
-        "steps": settings.arenas * settings.steps,
-        "interventions": int(episodes.intervened.sum()),
-        "collisions": int(episodes.collisions.sum()),
-    }
+@dataclass(kw_only=True)
+class Forests:
+    """The forests that collisions are counted in."""
+
+    sizes: Annotated[list[Side], Range(1)]
+    densities: Annotated[list[CountOrZero], Range(1)]
+    arenas: Count
+    steps: Count
+    seed: Seed
 
 
-@command("collisions")
+@dataclass(kw_only=True)
+class Settings(WithPolicy):
+    """The settings of the count."""
+
+    unread: ClassVar = (*WithPolicy.unread, "safety", "env.size", "env.n_trees")
+
+    collisions: Forests
+
+    @staticmethod
+    def check(cfg: DictConfig) -> None:
+        """Refuses another policy than the learned one."""
+        if cfg.policy.name != "learned":
+            raise not_allowed("policy", cfg.policy.name, "the learned one is compared with random")
+
+
+@command("collisions", Settings)
 def main(cfg: DictConfig) -> int:
     """Runs a random and the learned policy over sizes and densities; returns the filter's failures.
 
     The random policy draws among all nine actions. Without the filter both collide.
     """
-    folder = Path(HydraConfig.get().runtime.output_dir)
-    build.prepare(cfg)
-    build.make_output_folder(folder)
-    build.require_positive(cfg, "collisions.arenas", "collisions.steps")
-    if cfg.policy.name != "learned":
-        raise build.ConfigError(
-            f"policy={cfg.policy.name} is not allowed: the learned policy is compared with random"
-        )
-    learned, _ = build.make_policy(cfg, asked_for())
-    policies = {"random": RandomWalk(feasible_only=False), "learned": learned}
-    forests = [
-        {"size": size, "n_trees": round(density * size**2 / 50**2)}
-        for size, density in itertools.product(cfg.collisions.sizes, cfg.collisions.densities)
-    ]
-    runs = list(itertools.product(policies, (True, False), forests))
-    rows = []
-    for name, filtered, forest in tqdm(runs, disable=not sys.stderr.isatty()):
-        rows.append({"policy": name} | count(cfg, policies[name], forest, filtered))
-    table = io.StringIO(newline="")
-    writer = csv.DictWriter(table, _COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    atomic_write(folder / "collisions.csv", table.getvalue())
-    for name, filtered in itertools.product(policies, ("on", "off")):
-        chosen = [row for row in rows if row["policy"] == name and row["filter"] == filtered]
-        steps, hits = (sum(row[key] for row in chosen) for key in ("steps", "collisions"))
-        print(f"{name:<8} filter {filtered:<4} {steps:>10,} steps  {hits:>9,} collisions")
-    print(f"\nresults: {folder / 'collisions.csv'}")
-    return sum(row["collisions"] for row in rows if row["filter"] == "on")
+    from forestrl.jobs import collisions  # here, as help and configuration need no torch
+
+    return collisions.run(cfg)
 
 
 if __name__ == "__main__":

@@ -2,123 +2,42 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, OmegaConf
-from tqdm.auto import tqdm
+from omegaconf import DictConfig
 
-from forestrl import __version__, build
-from forestrl.command import asked_for, command
-from forestrl.evaluation.episodes import Episodes, evaluate
-from forestrl.evaluation.metrics import eval_metrics
-from forestrl.evaluation.parts import Parts
-from forestrl.evaluation.picture import Player, draw_episode
-from forestrl.evaluation.report import table, write_report
-from forestrl.loggers import Logger, NoLogger
-from forestrl.paper import coverage_of
+from forestrl.command import command
+from forestrl.config import Node
+from forestrl.shared import Count, CountOrZero, Seed, WithPolicy
 
 
-def run(cfg: DictConfig, policy: Any, parts: Parts) -> Episodes:
-    """Runs a policy on the test arenas of a configuration, with a bar in steps of all arenas."""
-    settings = cfg.eval
-    bar = tqdm(
-        total=settings.arenas * settings.steps,
-        unit="step",
-        unit_scale=True,
-        disable=not sys.stderr.isatty(),
-    )
-    with bar:
-        return evaluate(
-            partial(build.make_env, cfg, policy=policy),
-            policy,
-            seed=settings.seed,
-            indices=range(settings.first, settings.first + settings.arenas),
-            steps=settings.steps,
-            batch=settings.batch,
-            progress=lambda done: bar.update(done - bar.n),
-            parts=parts,
-        )
+@dataclass(kw_only=True)
+class Evaluation:
+    """The test arenas."""
+
+    arenas: Count
+    steps: Count
+    seed: Seed
+    first: CountOrZero
+    batch: Count
 
 
-@command("eval")
+@dataclass(kw_only=True)
+class Settings(WithPolicy):
+    """The settings of an evaluation."""
+
+    logger: Node
+    resume: Path | None
+    eval: Evaluation
+
+
+@command("eval", Settings)
 def main(cfg: DictConfig) -> float:
     """Evaluates ``cfg.policy``; returns the mean coverage at the end, for sweepers."""
-    output = HydraConfig.get().runtime.output_dir
-    folder = Path(output if cfg.resume is None else str(cfg.resume))
-    build.prepare(cfg)
-    build.require_positive(cfg, "eval.arenas", "eval.steps", "eval.batch")
-    build.make_output_folder(folder)
-    cfg = build.as_trained(cfg, asked_for())
-    policy, about = build.make_policy(cfg, asked_for())
-    logger = build.make_logger(cfg, folder)
-    failed = True
-    try:
-        episodes, summary = report(cfg, policy, about, folder)
-        if not isinstance(logger, NoLogger):
-            log(cfg, policy, logger, folder, episodes, summary)
-        failed = False
-    finally:
-        logger.close(failed)
-    print(table(summary))
-    print(f"\nresults: {folder}")
-    return float(episodes.coverage[:, -1].mean())
+    from forestrl.jobs import eval  # here, as help and configuration need no torch
 
-
-def report(
-    cfg: DictConfig, policy: Any, about: dict[str, Any], folder: Path
-) -> tuple[Episodes, dict[str, Any]]:
-    """Runs the policy and writes the report; returns the episodes and their summary."""
-    settings = {
-        **about,
-        "env": OmegaConf.to_container(cfg.env, resolve=True),
-        "graph": OmegaConf.to_container(cfg.graph, resolve=True),
-        "eval": OmegaConf.to_container(cfg.eval, resolve=True),
-        "filter": cfg.safety.get("_target_") is not None,
-    }
-    parts = Parts(folder / "parts", settings)
-    episodes = run(cfg, policy, parts)
-    words = [word for word in HydraConfig.get().overrides.task if not word.startswith("resume=")]
-    command = shlex.join(["forestrl", "eval", *words])
-    meta = {**settings, "version": __version__, "command": command}
-    paper = coverage_of(about["policy"], cfg.policy.get("variant"), cfg.env)
-    summary = write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)
-    parts.clear()
-    return episodes, summary
-
-
-def log(
-    cfg: DictConfig,
-    policy: Any,
-    logger: Logger,
-    folder: Path,
-    episodes: Episodes,
-    summary: dict[str, Any],
-) -> None:
-    """Sends the report to a dashboard, with an episode in the first arena."""
-    settings, picture = cfg.eval, folder / "episode.gif"
-    rows = {row["measure"]: row for row in summary["measures"]}
-    end = rows[f"coverage_{settings.steps}"]
-    interval = {f"eval/coverage_{side}": end[side] for side in ("low", "high")}
-    known = {name: value for name, value in interval.items() if value is not None}
-    logger.log_metrics(eval_metrics(episodes) | known, step=0)
-    logger.log_figure("eval/coverage_curve", folder / "coverage.png", step=0)
-    if (folder / "interventions.png").is_file():
-        logger.log_figure("eval/interventions", folder / "interventions.png", step=0)
-    logger.log_table("eval/episodes", folder / "episodes.csv")
-    draw_episode(
-        {cfg.policy.name: Player(build.make_env(cfg, 1, policy), policy)},
-        picture,
-        seed=settings.seed,
-        arena=settings.first,
-        steps=min(settings.steps, 500),
-        every=5,
-    )
-    logger.log_figure("eval/episode", picture, step=0)
+    return eval.run(cfg)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from forestrl.settings import checked
 from forestrl.storage import atomic_write
 
 
@@ -150,13 +151,14 @@ class WandbLogger(NoLogger):
         dir: where the ``wandb`` folder goes; None for the sweep's folder, or the run's.
     """
 
+    @checked
     def __init__(
         self,
         run: Run,
         project: str = "forestrl",
         entity: str | None = None,
         group: str | None = None,
-        dir: str | None = None,
+        dir: Path | None = None,
     ) -> None:
         import wandb
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import statistics
 import sys
 import time
-from pathlib import Path
 from types import TracebackType
 
 from tqdm.auto import tqdm
@@ -15,6 +14,7 @@ _SHOWN = {
     "rollout/coverage": "coverage",
     "safety/intervention_rate": "interventions",
 }
+_CUT_SHORT = "{} in training episodes, cut short at first; eval.every=0 measures no other"
 _SECONDS_BETWEEN_LINES = 10
 
 
@@ -75,19 +75,18 @@ class Progress:
             f"{_clock(left)} left  {shown}"
         )
 
-    def summary(self, metrics: dict[str, float], run_dir: Path) -> str:
-        """Sums the training up in a short table, with the next command to type."""
+    def summary(self, metrics: dict[str, float]) -> str:
+        """Sums the training up in a short table."""
         rows = {
             "frames": f"{self.done:,}",
             "time": _clock(time.monotonic() - self.began),
-            "coverage, last episodes": self._value("coverage"),
             "interventions": self._value("interventions"),
+            "coverage": _CUT_SHORT.format(self._value("coverage")),
         }
         if "eval/coverage" in metrics:
-            rows["coverage, test arenas"] = f"{metrics['eval/coverage']:.1%}"
+            rows["coverage"] = f"{metrics['eval/coverage']:.1%} in test arenas"
         width = max(map(len, rows))
-        table = "\n".join(f"  {name:<{width}}  {value}" for name, value in rows.items())
-        return f"{table}\n\nnext: forestrl eval checkpoint={run_dir}"
+        return "\n".join(f"  {name:<{width}}  {value}" for name, value in rows.items())
 
     def _value(self, name: str) -> str:
         return f"{self.shown[name]:.1%}" if name in self.shown else "no episode ended yet"

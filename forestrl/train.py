@@ -2,184 +2,45 @@
 
 from __future__ import annotations
 
-import resource
-import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import torch
-from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, OmegaConf
-from tensordict import TensorDictBase
+from omegaconf import DictConfig
 
-from forestrl import build
-from forestrl.command import asked_for, command
-from forestrl.evaluation.episodes import evaluate
-from forestrl.evaluation.metrics import eval_metrics
-from forestrl.evaluation.picture import Player, draw_episode
-from forestrl.learning.checkpoint import (
-    load_training,
-    restore_training,
-    save_training,
-    training_state,
-)
-from forestrl.learning.metrics import summarize
-from forestrl.policies.files import POLICY_FILE, save_policy
-from forestrl.progress import Progress
+from forestrl.command import command
+from forestrl.config import Node
+from forestrl.shared import Count, CountOrZero, Seed, World
 
 
-class Training:
-    """A training run: everything that lives from the first frame to the last.
+@dataclass(kw_only=True)
+class Evaluation:
+    """The periodic evaluation."""
 
-    Args:
-        cfg: the whole configuration.
-        run_dir: where metrics, checkpoints and pictures go.
-    """
-
-    def __init__(self, cfg: DictConfig, run_dir: Path) -> None:
-        torch.manual_seed(cfg.seed)
-        self.cfg, self.run_dir = cfg, run_dir
-        self.networks = build.make_networks(cfg)
-        self.ppo = build.make_ppo(cfg, self.networks)
-        self.env = build.make_training_env(cfg)
-        build.check_model(cfg, self.networks, self.env)
-        self.collector = build.make_collector(cfg, self.env, self.ppo.actor)
-        self.policy = self.networks.make_policy()
-        self.frames, self.best, self.logger_id = 0, float("-inf"), None
-
-    @property
-    def total_frames(self) -> int:
-        """Frames of the whole training: whole batches, at least as many as asked for."""
-        batch = self.cfg.algo.frames_per_batch
-        return -(-self.cfg.total_frames // batch) * batch
-
-    def resume(self) -> None:
-        """Goes on from the run folder's latest checkpoint."""
-        state = load_training(self.run_dir / "checkpoints" / "latest")
-        progress = restore_training(state, self.ppo, self.collector)
-        self.frames, self.best = progress["frames"], progress["best"]
-        self.logger_id = progress["logger_id"]
-
-    def run(self, logger: Any, bar: Progress) -> dict[str, float]:
-        """Trains to the end; returns the last metrics."""
-        metrics: dict[str, float] = {}
-        collected = iter(self.collector)
-        while self.frames < self.total_frames:
-            start = time.perf_counter()
-            batch = next(collected)
-            middle = time.perf_counter()
-            metrics = summarize(batch, self.env.transform) | self.ppo.update(batch)
-            end = time.perf_counter()
-            self.frames += batch.numel()
-            metrics |= _timing(batch, middle - start, end - middle)
-            if self._due(self.cfg.eval.every):
-                metrics |= self.evaluate(logger)
-            logger.log_metrics(metrics, step=self.frames)
-            bar.update(self.frames, metrics)
-            if self._due(self.cfg.checkpoint_every) or self.frames >= self.total_frames:
-                self.save("latest", logger)
-        return metrics
-
-    def _due(self, every: int) -> bool:
-        """Tells whether a multiple of ``every`` was passed in this update, or the end reached."""
-        if every <= 0:
-            return False
-        passed = self.frames // every > (self.frames - self.cfg.algo.frames_per_batch) // every
-        return passed or self.frames >= self.total_frames
-
-    def evaluate(self, logger: Any) -> dict[str, float]:
-        """Measures the policy on the fixed arenas; keeps it if it is the best so far."""
-        cfg = self.cfg.eval
-        episodes = evaluate(
-            lambda n: build.make_env(self.cfg, num_envs=n),
-            self.policy,
-            seed=cfg.seed,
-            indices=range(cfg.arenas),
-            steps=cfg.steps,
-            batch=cfg.arenas,
-        )
-        metrics = eval_metrics(episodes)
-        if metrics["eval/auc"] > self.best:
-            self.best = metrics["eval/auc"]
-            self.save("best", logger)
-        return metrics
-
-    def draw(self, logger: Any) -> None:
-        """Draws an episode in the first of the fixed arenas."""
-        cfg, path = self.cfg.eval, self.run_dir / "episode.gif"
-        steps = min(cfg.steps, 500)
-        player = Player(build.make_env(self.cfg, num_envs=1), self.policy)
-        draw_episode({"policy": player}, path, seed=cfg.seed, arena=0, steps=steps, every=5)
-        logger.log_figure("eval/episode", path, step=self.frames)
-
-    def save(self, alias: str, logger: Any) -> None:
-        """Writes the policy, and for the latest the training state beside it."""
-        folder = self.run_dir / "checkpoints" / alias
-        folder.mkdir(parents=True, exist_ok=True)
-        about = {"frames": self.frames, "seed": self.cfg.seed}
-        save_policy(folder / POLICY_FILE, build.to_policy(self.cfg, self.networks, about))
-        if alias == "latest":
-            progress = {"frames": self.frames, "best": self.best, "logger_id": self.logger_id}
-            save_training(folder, training_state(self.ppo, self.collector, progress))
-        if alias == "best" or self.frames >= self.total_frames:
-            logger.log_policy(folder / POLICY_FILE, [alias])
+    every: CountOrZero
+    arenas: Count
+    steps: Count
+    seed: Seed
 
 
-def _timing(batch: TensorDictBase, collect: float, update: float) -> dict[str, float]:
-    """Gives frames per second, seconds of each part, and the peak of memory in GB."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    return {
-        "time/fps": batch.numel() / (collect + update),
-        "time/collect": collect,
-        "time/update": update,
-        "time/memory": peak,
-    }
+@dataclass(kw_only=True)
+class Settings(World):
+    """The settings of a training."""
+
+    algo: Node
+    logger: Node
+    total_frames: Count
+    episode_steps: Count
+    checkpoint_every: CountOrZero
+    resume: Path | None
+    eval: Evaluation
 
 
-def resumed(cfg: DictConfig) -> DictConfig:
-    """Gives the configuration of the run to go on with; what was asked for now wins.
-
-    The seed does not: the sources of randomness go on where they were.
-    """
-    path = Path(str(cfg.resume)) / ".hydra" / "config.yaml"
-    if not path.is_file():
-        raise FileNotFoundError(f"resume={cfg.resume} is not a run folder: {path} does not exist")
-    old = DictConfig(OmegaConf.load(path))
-    for name in asked_for():
-        OmegaConf.update(old, name, OmegaConf.select(cfg, name))
-    return old
-
-
-@command("train")
+@command("train", Settings)
 def main(cfg: DictConfig) -> float:
-    """Trains for ``cfg.total_frames``; returns the mean coverage for sweepers.
+    """Trains for ``cfg.total_frames``; returns the mean coverage for sweepers."""
+    from forestrl.jobs import train  # here, as help and configuration need no torch
 
-    It is that of the last evaluation or, if there is none, of the last episodes; nan if there was
-    nothing left to train.
-    """
-    run_dir = Path(HydraConfig.get().runtime.output_dir)
-    if cfg.resume is not None:
-        run_dir, cfg = Path(str(cfg.resume)), resumed(cfg)
-    build.prepare(cfg)
-    build.require_positive(cfg, "total_frames", "eval.arenas", "eval.steps")
-    build.make_output_folder(run_dir)
-    training = Training(cfg, run_dir)
-    if cfg.resume is not None:
-        training.resume()
-    logger = build.make_logger(cfg, run_dir, training.frames, training.logger_id)
-    training.logger_id = getattr(logger, "id", None)
-    failed = True
-    try:
-        with Progress(training.total_frames, training.frames) as bar:
-            metrics = training.run(logger, bar)
-        if cfg.eval.every > 0:
-            training.draw(logger)
-        failed = False
-    finally:
-        training.collector.shutdown()
-        logger.close(failed)
-    print(bar.summary(metrics, run_dir))
-    return metrics.get("eval/coverage", metrics.get("rollout/coverage", float("nan")))
+    return train.run(cfg)
 
 
 if __name__ == "__main__":

@@ -10,10 +10,12 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
 
 L0 = {"functional", "kernels"}
-L1 = {"keys", "paper", "sampling", "statistics", "status", "storage", "progress"}
+L1 = {"keys", "paper", "sampling", "settings", "statistics", "status", "storage"}
+L1 |= {"progress", "wording"}
 L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "benchmark", "sweeps", "tables"}
-L3 = {"config", "command", "loggers", "build"}
+L3 = {"config", "command", "loggers", "build", "runs"}
+LIGHT = {"config", "command", "settings", "shared"}
 L4 = {"train", "eval", "render", "collisions", "bench", "figures"}
 ROOMS = {  # room: the other rooms it may import from
     "": set(),
@@ -21,6 +23,9 @@ ROOMS = {  # room: the other rooms it may import from
     "kernels": {"functional"},
     **{name: set() for name in L1},
     "sampling": {"keys"},
+    "settings": {"wording"},
+    "signatures": {"settings"},
+    "terminal": set(),
     **dict.fromkeys(L2, L0 | L1),
     "planner": L0 | L1 | L2,
     "rendering": L0 | L1 | {"envs"},
@@ -29,12 +34,17 @@ ROOMS = {  # room: the other rooms it may import from
     "tables": {"statistics"},
     "sweeps": {"evaluation", "statistics", "storage", "tables"},
     "publishing": {"evaluation", "paper", "statistics", "sweeps", "tables"},
-    "config": set(),
-    "command": {"config"},
-    "loggers": {"storage"},
+    "config": {"settings", "signatures", "wording"},
+    "help": {"config", "settings", "wording"},
+    "runs": set(),
+    "command": {"config", "help", "runs", "settings", "terminal", "wording"},
+    "shared": {"config", "settings"},
+    "loggers": {"settings", "storage"},
     "build": L0 | L1 | L2 | STUDIES | {"config", "loggers"},
-    **dict.fromkeys(L4, {""} | L0 | L1 | L2 | STUDIES | L3 | {"planner"}),
-    "cli": {""},
+    "jobs": {""} | L0 | L1 | L2 | STUDIES | L3 | {"planner"},
+    **dict.fromkeys(L4, LIGHT | {"jobs"}),
+    "completion": set(),
+    "cli": {"", "completion", "terminal"},
 }
 LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "": set(),
@@ -44,13 +54,18 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "keys": {"torch", "tensordict"},
     "sampling": {"torch", "tensordict"},
     "paper": set(),
+    "settings": set(),
+    "signatures": set(),
     "status": set(),
     "storage": set(),
     "statistics": {"numpy", "scipy"},
     "tables": {"tabulate"},
+    "terminal": set(),
+    "wording": set(),
     "sweeps": {"yaml"},
     "publishing": {"numpy", "pandas", "yaml", "matplotlib"},
     "progress": {"tqdm"},
+    "completion": set(),
     "cli": set(),
 }
 FUNCTIONAL = [  # each row may import from the rows above it

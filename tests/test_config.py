@@ -12,10 +12,10 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 from forestrl import build
 from forestrl.cli import COMMANDS
 from forestrl.config import CONF_DIR
+from forestrl.jobs.train import Training
 from forestrl.loggers import NoLogger, Run
 from forestrl.policies.gatv2 import GATv2ActorCritic
 from forestrl.progress import Progress
-from forestrl.train import Training
 from tests.commands import compose
 
 CONF = Path(CONF_DIR)

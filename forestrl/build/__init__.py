@@ -9,7 +9,7 @@ from forestrl.build.envs import (
 )
 from forestrl.build.errors import ConfigError
 from forestrl.build.logging import make_logger
-from forestrl.build.machine import make_output_folder, prepare, require_positive
+from forestrl.build.machine import prepare
 from forestrl.build.networks import check_model, make_networks, make_ppo, to_policy
 from forestrl.build.policies import as_trained, make_policy
 
@@ -23,11 +23,9 @@ __all__ = [
     "make_logger",
     "make_networks",
     "make_observation",
-    "make_output_folder",
     "make_policy",
     "make_ppo",
     "make_training_env",
     "prepare",
-    "require_positive",
     "to_policy",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule
@@ -9,6 +11,9 @@ from torch import Tensor, nn
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
+from forestrl.settings import Range, checked, not_allowed
+
+_LEAST_DECAY = 1e-6  # of gamma times lambda; TorchRL's vectorised GAE has no room for less
 _TARGETS = ("action", "action_log_prob", "advantage", "value_target", "state_value")
 
 
@@ -38,46 +43,36 @@ class PPO:
             of its range.
     """
 
+    @checked
     def __init__(
         self,
         actor: TensorDictModule,
         critic: TensorDictModule,
         *,
-        frames_per_batch: int = 1024,
-        num_minibatches: int = 64,
-        num_epochs: int = 8,
-        lr: float = 3e-4,
-        gamma: float = 0.99,
-        gae_lambda: float = 0.95,
-        clip_epsilon: float = 0.2,
-        critic_coeff: float = 1.0,
-        entropy_coeff: float = 0.02,
-        max_grad_norm: float = 0.5,
+        frames_per_batch: Annotated[int, Range(2, 1_000_000)] = 1024,
+        num_minibatches: Annotated[int, Range(1, 1_000_000)] = 64,
+        num_epochs: Annotated[int, Range(1, 1000)] = 8,
+        lr: Annotated[float, Range(above=0, high=1)] = 3e-4,
+        gamma: Annotated[float, Range(0, 1)] = 0.99,
+        gae_lambda: Annotated[float, Range(0, 1)] = 0.95,
+        clip_epsilon: Annotated[float, Range(above=0, high=10)] = 0.2,
+        critic_coeff: Annotated[float, Range(0, 1000)] = 1.0,
+        entropy_coeff: Annotated[float, Range(0, 1000)] = 0.02,
+        max_grad_norm: Annotated[float, Range(above=0)] = 0.5,
     ) -> None:
-        positive = {
-            "frames_per_batch": frames_per_batch,
-            "num_epochs": num_epochs,
-            "lr": lr,
-            "clip_epsilon": clip_epsilon,
-            "max_grad_norm": max_grad_norm,
-        }
-        for name, value in positive.items():
-            if value <= 0:
-                raise ValueError(f"{name}={value} is not allowed: it must be more than 0")
-        if num_minibatches < 1 or frames_per_batch % num_minibatches:
-            raise ValueError(
-                f"num_minibatches={num_minibatches} is not allowed: it must divide "
-                f"frames_per_batch={frames_per_batch}"
-            )
-        for name, value in (("gamma", gamma), ("gae_lambda", gae_lambda)):
-            if not 0 <= value <= 1:
-                raise ValueError(f"{name}={value} is not allowed: it must be in [0, 1]")
+        if frames_per_batch % num_minibatches:
+            reason = f"it must divide frames_per_batch={frames_per_batch}"
+            raise not_allowed("num_minibatches", num_minibatches, reason)
         self.actor, self.critic = actor, critic
         self.frames_per_batch, self.num_epochs = frames_per_batch, num_epochs
         self.max_grad_norm = max_grad_norm
         # The values are computed here, so that each state passes through the critic once.
         self.advantage = GAE(
-            gamma=gamma, lmbda=gae_lambda, value_network=None, average_gae=True, vectorized=True
+            gamma=gamma,
+            lmbda=gae_lambda,
+            value_network=None,
+            average_gae=True,
+            vectorized=gamma * gae_lambda > _LEAST_DECAY,
         )
         self.loss = ClipPPOLoss(
             actor,
@@ -137,6 +132,7 @@ class PPO:
     def step(self, minibatch: TensorDictBase) -> Tensor:
         """Takes one Adam step; returns what ``_MEASURED`` lists, float32 ``[n]``."""
         losses = self.loss(minibatch)
+        losses.setdefault("loss_critic", losses["loss_objective"].new_zeros(()))  # if it weighs 0
         self.optimizer.zero_grad()
         (losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"]).backward()
         norm = nn.utils.clip_grad_norm_(self.parameters, self.max_grad_norm)

@@ -9,6 +9,7 @@ from tensordict.nn import TensorDictModuleBase
 from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.sampling import uniform
+from forestrl.settings import checked
 
 
 class RandomWalk(TensorDictModuleBase):
@@ -21,6 +22,7 @@ class RandomWalk(TensorDictModuleBase):
             all nine actions.
     """
 
+    @checked
     def __init__(self, feasible_only: bool = True) -> None:
         self.in_keys = [K.CELLS, K.POSITION]
         self.out_keys = [K.ACTION]

@@ -146,7 +146,7 @@ def test_a_foreign_world_observation_and_network_are_measured(tmp_path, monkeypa
         ("bench.num_envs=[0]", "bench.num_envs=[0] is not allowed"),
         ("bench.num_envs=[]", "bench.num_envs=[] is not allowed"),
         ("bench.sizes=[2]", "bench.sizes=[2] is not allowed"),
-        ("bench.sizes=[large]", "bench.sizes=['large'] is not allowed"),
+        ("bench.sizes=[large]", "bench.sizes=[large] is not allowed"),
         ("bench.seconds=0", "bench.seconds=0 is not allowed"),
     ],
 )

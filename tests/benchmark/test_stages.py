@@ -4,10 +4,10 @@ import pytest
 import torch
 
 from forestrl import keys as K
-from forestrl.bench import make_setup, resized
 from forestrl.benchmark.stages import decisions, learning_stages, steps
 from forestrl.benchmark.states import arrange, enter, explore
 from forestrl.envs import ExplorationGraph, FrontierPotentialReward, SafetyFilter
+from forestrl.jobs.bench import make_setup, resized
 from tests.commands import compose
 
 FRAMES, EPOCHS = 24, 2

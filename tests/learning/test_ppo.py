@@ -1,5 +1,6 @@
 """PPO against its formulas, and Table III."""
 
+import copy
 import math
 
 import pytest
@@ -98,10 +99,11 @@ def test_advantage_is_that_of_the_loop_normalised_over_the_batch(networks, batch
     torch.testing.assert_close(batch["advantage"].squeeze(-1), normalised, atol=1e-5, rtol=1e-5)
 
 
-def test_gamma_and_lambda_are_used(networks, batch):
+@pytest.mark.parametrize(("gamma", "lmbda"), [(0.5, 0.25), (0, 0.95), (0.99, 0), (1e-9, 1), (1, 1)])
+def test_gamma_and_lambda_are_used(gamma, lmbda, networks, batch):
     value, next_value = values(networks, batch), values(networks, batch["next"])
-    expected = gae(batch, value, next_value, gamma=0.5, lmbda=0.25)
-    make_ppo(networks, gamma=0.5, gae_lambda=0.25).estimate_advantage(batch)
+    expected = gae(batch, value, next_value, gamma=gamma, lmbda=lmbda)
+    make_ppo(networks, gamma=gamma, gae_lambda=lmbda).estimate_advantage(batch)
     torch.testing.assert_close(batch["value_target"].squeeze(-1), expected + value)
 
 
@@ -179,7 +181,7 @@ def test_both_networks_learn(networks, batch):
     assert not same
 
 
-@pytest.mark.parametrize("minibatches", [0, -1, 3, 7, 32])
+@pytest.mark.parametrize("minibatches", [3, 7, 32])
 def test_minibatches_must_divide_the_batch(minibatches, networks):
     both = f"num_minibatches={minibatches} .* frames_per_batch={FRAMES}"
     with pytest.raises(ValueError, match=both):
@@ -191,6 +193,8 @@ def test_minibatches_must_divide_the_batch(minibatches, networks):
     [
         *((name, value) for name in ("lr", "clip_epsilon", "max_grad_norm") for value in (0, -1)),
         ("num_epochs", 0),
+        ("num_minibatches", 0),
+        ("num_minibatches", -1),
         ("frames_per_batch", 0),
         *((name, value) for name in ("gamma", "gae_lambda") for value in (-0.1, 1.1)),
     ],
@@ -198,3 +202,11 @@ def test_minibatches_must_divide_the_batch(minibatches, networks):
 def test_values_out_of_range_are_refused(name, value, networks):
     with pytest.raises(ValueError, match=f"{name}={value} is not allowed: it must be"):
         make_ppo(networks, **{name: value})
+
+
+def test_a_critic_that_weighs_nothing_is_not_trained(networks, batch):
+    before = copy.deepcopy(networks.state_dict())
+    metrics = make_ppo(networks, critic_coeff=0).update(batch)
+    after = networks.state_dict()
+    changed = {name.split(".")[0] for name in after if not torch.equal(after[name], before[name])}
+    assert metrics["loss/critic"] == 0 and changed == {"actor"}

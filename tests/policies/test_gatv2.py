@@ -325,3 +325,13 @@ def test_exp_beyond_its_range():
     assert (x[0, :2] < 2e-38).all()
     assert np.isnan(x[0, 2])
     assert 1e38 < x[0, 3] < np.inf
+
+
+def test_a_network_too_wide_to_compile_is_computed_by_pyg_and_says_so_once(caplog):
+    torch.manual_seed(0)
+    wide, other = (GATv2Encoder(hidden=129, heads=4) for _ in range(2))
+    assert wide.kernel == other.kernel == "pyg"
+    assert wide(*graphs((3,), dtype=torch.float32)).shape == (3, 9)
+    (message,) = caplog.messages
+    assert message.startswith("heads x hidden = 516 is more than is compiled, 512")
+    assert GATv2Encoder(hidden=128, heads=4).kernel == "fused"

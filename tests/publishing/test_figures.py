@@ -138,7 +138,7 @@ def test_a_broken_file_gives_one_clear_line(tmp_path, breakage, message):
     ],
 )
 def test_wrong_paths_give_one_clear_line(results, arguments, message):
-    result = forestrl("figures", f"results={results}", *arguments)
+    result = forestrl("figures", f"results={results}", "page=null", *arguments)
     assert result.status == 1 and result.err.count("\n") == 1 and message in result.err
 
 

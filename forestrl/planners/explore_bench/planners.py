@@ -16,7 +16,7 @@ around the wall, indices beyond the map. Here the planners see our map, and the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, get_args
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -24,6 +24,7 @@ from torch import Tensor
 from forestrl import keys as K
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.explore_bench import corrected, published
+from forestrl.settings import checked
 
 Variant = Literal["published", "corrected"]
 _GOAL = ("planner", "goal")
@@ -35,10 +36,8 @@ class _ExploreBench(ClassicalPlanner):
     _published: Callable[[Tensor, Tensor, Tensor], tuple[Tensor, Tensor]]
     _corrected: Callable[[Tensor, Tensor, Tensor], tuple[Tensor, Tensor, Tensor]]
 
+    @checked
     def __init__(self, variant: Variant) -> None:
-        if variant not in get_args(Variant):
-            allowed = " or ".join(get_args(Variant))
-            raise ValueError(f"variant={variant} is not allowed: it must be {allowed}")
         as_published = variant == "published"
         super().__init__(reads=[K.TREES] * as_published, remembers=[_GOAL] * (not as_published))
         self.variant = variant

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from numba import njit
@@ -14,6 +15,7 @@ from forestrl.kernels.batches import over_batch
 from forestrl.kernels.flood import PAD, eight_steps, pad, walk
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.steps import EXPLORING, arguments, first_action, status_at_end
+from forestrl.settings import Range, checked
 
 _UNKNOWN = int(Cell.UNKNOWN)
 
@@ -107,14 +109,15 @@ class InformationGain(ClassicalPlanner):
         power: 1: gain per move; less: farther frontiers count more; 0: gain alone.
 
     Raises:
-        ValueError: if the window is not odd and at least 3, or the power is negative.
+        ValueError: if a value is out of its range.
     """
 
-    def __init__(self, window: int = 7, power: float = 1.0) -> None:
-        if window < 3 or window % 2 == 0:
-            raise ValueError(f"window={window} is not allowed: it must be odd and at least 3")
-        if power < 0:
-            raise ValueError(f"power={power} is not allowed: it must be 0 or more")
+    @checked
+    def __init__(
+        self,
+        window: Annotated[int, Range(3, 101, odd=True)] = 7,
+        power: Annotated[float, Range(0, 10)] = 1.0,
+    ) -> None:
         super().__init__()
         self.window, self.power = window, power
 

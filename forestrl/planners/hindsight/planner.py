@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import torch
 from torch import Tensor
 
@@ -9,6 +11,7 @@ from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.hindsight import annealing
+from forestrl.settings import Range, checked
 from forestrl.status import Status
 
 _PATH, _START = ("planner", "path"), ("planner", "start")
@@ -32,13 +35,13 @@ class Hindsight(ClassicalPlanner):
         ValueError: if a value is out of its range.
     """
 
+    @checked
     def __init__(
-        self, coverage_goal: float = 0.98, lidar_range: float = 5.0, iterations: int = 20_000
+        self,
+        coverage_goal: Annotated[float, Range(above=0, high=1)] = 0.98,
+        lidar_range: Annotated[float, Range(1.415, 100)] = 5.0,
+        iterations: Annotated[int, Range(0, 1_000_000_000)] = 20_000,
     ) -> None:
-        if not 0 < coverage_goal <= 1:
-            raise ValueError(f"coverage_goal={coverage_goal} is not allowed: it must be in (0, 1]")
-        if iterations < 0:
-            raise ValueError(f"iterations={iterations} is not allowed: it must be 0 or more")
         super().__init__(reads=[K.TREES, K.STEP_COUNT], remembers=[_PATH, _START])
         self.coverage_goal, self.iterations = coverage_goal, iterations
         self.sight_lines = F.sight_lines(lidar_range)

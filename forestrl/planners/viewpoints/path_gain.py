@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 import torch
@@ -17,6 +18,7 @@ from forestrl.planners.viewpoints.paths import first_step, paths_from
 from forestrl.planners.viewpoints.scores import NOWHERE, path_gain
 from forestrl.planners.viewpoints.sight import Sight, sight
 from forestrl.planners.viewpoints.views import Views, blank, spend, update
+from forestrl.settings import Range, checked
 
 GRID, SEEN, COUNTS = ("planner", "grid"), ("planner", "seen"), ("planner", "counts")
 """What could be seen, kept up from step to step: the parts of ``Views``."""
@@ -41,12 +43,15 @@ class PathGain(ClassicalPlanner):
         power: exponent of the path length.
 
     Raises:
-        ValueError: if the power is negative.
+        ValueError: if a value is out of its range.
     """
 
-    def __init__(self, lidar_range: float = 5.0, power: float = 1.4) -> None:
-        if power < 0:
-            raise ValueError(f"power={power} is not allowed: it must be 0 or more")
+    @checked
+    def __init__(
+        self,
+        lidar_range: Annotated[float, Range(1.415, 100)] = 5.0,
+        power: Annotated[float, Range(0, 10)] = 1.4,
+    ) -> None:
         super().__init__(remembers=[GRID, SEEN, COUNTS])
         self.lidar_range, self.power = lidar_range, power
 

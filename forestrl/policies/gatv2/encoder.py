@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -16,8 +17,23 @@ from forestrl.functional import FEATURES, WAYPOINTS
 from forestrl.policies.gatv2.passes import ROWS, Graphs, run_chunks, unpack_gradients
 from forestrl.policies.gatv2.vectors import static
 
+_LOG = logging.getLogger(__name__)
+_WIDEST = 512  # channels; with 800 compiling takes minutes, and numba ends at 1000
 _CHUNKS = 8  # of a batch; gradients are summed within and then over them
 _PER_THREAD = 32  # graphs that are worth starting a thread for
+
+
+@cache
+def compiles(channels: int) -> bool:
+    """Tells whether layer 1 is narrow enough to be compiled, and says once if it is not."""
+    if channels <= _WIDEST:
+        return True
+    _LOG.warning(
+        "heads x hidden = %d is more than is compiled, %d: PyTorch Geometric computes it, slower",
+        channels,
+        _WIDEST,
+    )
+    return False
 
 
 @cache

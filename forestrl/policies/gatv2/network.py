@@ -13,7 +13,7 @@ from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.kernels.dispatch import by_device
 from forestrl.policies.actor_critic import ActorCritic
-from forestrl.policies.gatv2.encoder import gatv2_encoder
+from forestrl.policies.gatv2.encoder import compiles, gatv2_encoder
 
 Kernel = Literal["fused", "pyg"]
 Readout = Literal["mean", "concat"]
@@ -62,7 +62,7 @@ class GATv2Encoder(nn.Module):
             if value < 1:
                 msg = f"{name} must be at least 1, not {value}"
                 raise ValueError(msg)
-        self.kernel = kernel
+        self.kernel = "fused" if kernel == "fused" and compiles(heads * hidden) else "pyg"
         self.lidar_range = lidar_range if edge_lengths else math.inf  # the fixed edges' become 0
         self.edge_lengths = edge_lengths
         self.conv1 = GATv2Conv(F.FEATURES, hidden, heads=heads, edge_dim=1, add_self_loops=False)

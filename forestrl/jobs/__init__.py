@@ -1,0 +1,1 @@
+"""What the commands do, apart from their settings: the modules that need torch."""
