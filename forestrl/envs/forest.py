@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import secrets
+from typing import Annotated
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -15,6 +15,7 @@ from forestrl import functional as F
 from forestrl import kernels
 from forestrl import keys as K
 from forestrl.envs.worlds import RandomForest, World
+from forestrl.settings import Range, checked
 
 
 class ForestEnv(EnvBase):
@@ -50,21 +51,17 @@ class ForestEnv(EnvBase):
 
     _supports_set_state = True  # TorchRL's own word for reset(td, set_state=True)
 
+    @checked
     def __init__(
         self,
         world: World | None = None,
-        lidar_range: float = 5.0,
-        coverage_goal: float = 0.98,
-        max_steps: int = 2500,
-        num_envs: int | None = None,
-        seed: int | None = None,
+        lidar_range: Annotated[float, Range(1.415, 100)] = 5.0,
+        coverage_goal: Annotated[float, Range(above=0, high=1)] = 0.98,
+        max_steps: Annotated[int, Range(1, 1_000_000_000)] = 2500,
+        num_envs: Annotated[int, Range(1, 65_536)] | None = None,
+        seed: Annotated[int, Range(0, 2**63 - 1)] | None = None,
         device: torch.device | str = "cpu",
     ) -> None:
-        in_sight = lidar_range >= math.sqrt(2)
-        _check("lidar_range", lidar_range, in_sight, "at least 1.415: the 8 neighbours are seen")
-        _check("coverage_goal", coverage_goal, 0 < coverage_goal <= 1, "in (0, 1]")
-        _check("max_steps", max_steps, max_steps >= 1, "at least 1")
-        _check("num_envs", num_envs, num_envs is None or num_envs >= 1, "at least 1")
         super().__init__(device=device, batch_size=[] if num_envs is None else [num_envs])
         self.world: World = RandomForest() if world is None else world
         self.coverage_goal, self.max_steps = coverage_goal, max_steps
@@ -196,11 +193,6 @@ class ForestEnv(EnvBase):
     def _set_seed(self, seed: int | None) -> None:
         seed = secrets.randbits(63) if seed is None else seed
         self.rng = torch.Generator(device=self.device).manual_seed(seed)
-
-
-def _check(name: str, value: object, allowed: bool, meaning: str) -> None:
-    if not allowed:
-        raise ValueError(f"{name}={value} is not allowed: it must be {meaning}")
 
 
 def _check_arenas(trees: Tensor, position: Tensor | None, shape: tuple[int, ...]) -> None:

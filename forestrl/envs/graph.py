@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import torch
 from tensordict import TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite
@@ -11,7 +13,9 @@ from forestrl import functional as F
 from forestrl import kernels
 from forestrl import keys as K
 from forestrl.envs.asking import setting_of
+from forestrl.settings import Range, checked
 
+Window = Annotated[int, Range(1, 101, odd=True)]
 WINDOW = 7
 """``k``, cells (Sec. II-B)."""
 
@@ -35,12 +39,13 @@ class ExplorationGraph(Transform):
     adjustable = ("max_frontiers", "lidar_range")
     """Settings that a trained policy does not depend on."""
 
+    @checked
     def __init__(
-        self, window: int = WINDOW, max_frontiers: int = 256, lidar_range: float | None = None
+        self,
+        window: Window = WINDOW,
+        max_frontiers: Annotated[int, Range(1, 100_000)] = 256,
+        lidar_range: Annotated[float, Range(1.415, 100)] | None = None,
     ) -> None:
-        check_window(window)
-        if max_frontiers < 1:
-            raise ValueError(f"max_frontiers={max_frontiers} is not allowed: at least 1 is needed")
         super().__init__(in_keys=[K.CELLS, K.POSITION], out_keys=list(K.GRAPH))
         self.window, self.max_frontiers, self.lidar_range = window, max_frontiers, lidar_range
 
@@ -85,9 +90,3 @@ class ExplorationGraph(Transform):
             "graph/frontiers": float(frontiers.float().mean()),
             "graph/truncated": float((frontiers > self.max_frontiers).float().mean()),
         }
-
-
-def check_window(window: int) -> None:
-    """Refuses a window without a middle cell."""
-    if window < 1 or window % 2 == 0:
-        raise ValueError(f"window={window} is not allowed: it must be odd and at least 1")

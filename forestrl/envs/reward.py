@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
@@ -12,7 +14,8 @@ from forestrl import functional as F
 from forestrl import kernels
 from forestrl import keys as K
 from forestrl.envs.asking import setting_of
-from forestrl.envs.graph import WINDOW, ExplorationGraph, check_window
+from forestrl.envs.graph import WINDOW, ExplorationGraph, Window
+from forestrl.settings import Range, checked
 
 
 class FrontierPotentialReward(Transform):
@@ -36,19 +39,16 @@ class FrontierPotentialReward(Transform):
         ValueError: if ``beta`` is negative, or ``window`` even or not positive.
     """
 
+    @checked
     def __init__(
         self,
-        beta: float = 0.5,
-        window: int | None = None,
-        coverage_goal: float | None = None,
-        r_explored: float = 100.0,
-        r_unsafe: float = -5.0,
+        beta: Annotated[float, Range(0, 1000)] = 0.5,
+        window: Window | None = None,
+        coverage_goal: Annotated[float, Range(above=0, high=1)] | None = None,
+        r_explored: Annotated[float, Range(-1_000_000, 1_000_000)] = 100.0,
+        r_unsafe: Annotated[float, Range(-1_000_000, 1_000_000)] = -5.0,
         shaping: bool = True,
     ) -> None:
-        if beta < 0:
-            raise ValueError(f"beta={beta} is not allowed: it must be 0 or more")
-        if window is not None:
-            check_window(window)
         super().__init__(in_keys=[K.CELLS, K.POSITION, "reward"], out_keys=[K.POTENTIAL, "reward"])
         self.beta, self.window, self.coverage_goal = beta, window, coverage_goal
         self.r_explored, self.r_unsafe, self.shaping = r_explored, r_unsafe, shaping

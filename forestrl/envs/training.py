@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import torch
 from tensordict import TensorDictBase
 from torchrl.data import Bounded, Composite
 from torchrl.envs.transforms import Transform
 
 from forestrl import keys as K
+from forestrl.settings import Range, checked
 
 _HORIZON = "horizon"
 
@@ -29,9 +32,8 @@ class StaggeredEpisodes(Transform):
         ValueError: if ``steps`` is less than 1.
     """
 
-    def __init__(self, steps: int = 500) -> None:
-        if steps < 1:
-            raise ValueError(f"episode_steps={steps} is not allowed: at least 1 is needed")
+    @checked
+    def __init__(self, steps: Annotated[int, Range(1, 1_000_000_000)] = 500) -> None:
         super().__init__(in_keys=[K.STEP_COUNT], out_keys=[_HORIZON])
         self.steps = steps
 

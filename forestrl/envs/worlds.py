@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import torch
 from torch import Tensor
 
 from forestrl import functional as F
 from forestrl import kernels
+from forestrl.settings import Range, checked, not_allowed
 
-SMALLEST_SIDE = 3
+Side = Annotated[int, Range(3, 1000)]
+Radius = Annotated[float, Range(above=0, high=50)]
 _ATTEMPTS = 8  # forests drawn before giving up on finding one with a free cell
 
 
@@ -57,20 +59,16 @@ class RandomForest:
         (torch.Size([4, 20, 30]), torch.Size([4, 2]))
     """
 
+    @checked
     def __init__(
         self,
-        shape: int | tuple[int, int] = 50,
-        n_trees: int = 45,
-        tree_radius: tuple[float, float] = (1.0, 3.0),
+        shape: Side | tuple[Side, Side] = 50,
+        n_trees: Annotated[int, Range(0, 100_000)] = 45,
+        tree_radius: tuple[Radius, Radius] = (1.0, 3.0),
     ) -> None:
         self.shape = arena_shape(shape)
-        if n_trees < 0:
-            raise ValueError(f"n_trees={n_trees} is not allowed: it must be 0 or more")
-        if len(tree_radius) != 2 or not 0 < tree_radius[0] <= tree_radius[1]:
-            raise ValueError(
-                f"tree_radius={list(tree_radius)} is not allowed: it must be [smallest, largest] "
-                "with 0 < smallest <= largest"
-            )
+        if tree_radius[0] > tree_radius[1]:
+            raise not_allowed("tree_radius", tree_radius, "it must be [smallest, largest]")
         self.n_trees, self.tree_radius = n_trees, (tree_radius[0], tree_radius[1])
 
     def sample(
@@ -103,16 +101,8 @@ class RandomForest:
         )
 
 
-def arena_shape(shape: int | tuple[int, int]) -> tuple[int, int]:
-    """Gives rows and columns from either, or from the side of a square.
-
-    Raises:
-        ValueError: if there are not one or two numbers of at least 3.
-    """
-    sides = tuple(shape) if isinstance(shape, Sequence) else (shape, shape)
-    if len(sides) != 2 or not all(isinstance(s, int) and s >= SMALLEST_SIDE for s in sides):
-        raise ValueError(
-            f"shape={shape} is not allowed: it must be a side or [rows, columns] of at least "
-            f"{SMALLEST_SIDE} cells"
-        )
-    return sides
+@checked
+def arena_shape(shape: Side | tuple[Side, Side]) -> tuple[int, int]:
+    """Gives rows and columns from either, or from the side of a square."""
+    rows, columns = shape if isinstance(shape, Sequence) else (shape, shape)
+    return rows, columns

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from typing import Annotated, Literal
 
 import torch
 from torch import Tensor, nn
@@ -14,6 +14,7 @@ from forestrl import keys as K
 from forestrl.kernels.dispatch import by_device
 from forestrl.policies.actor_critic import ActorCritic
 from forestrl.policies.gatv2.encoder import compiles, gatv2_encoder
+from forestrl.settings import Range, checked
 
 Kernel = Literal["fused", "pyg"]
 Readout = Literal["mean", "concat"]
@@ -46,22 +47,16 @@ class GATv2Encoder(nn.Module):
 
     in_keys = K.GRAPH
 
+    @checked
     def __init__(
         self,
-        hidden: int = 16,
-        heads: int = 4,
+        hidden: Annotated[int, Range(1, 1024)] = 16,
+        heads: Annotated[int, Range(1, 64)] = 4,
         kernel: Kernel = "fused",
         lidar_range: float = 5.0,
         edge_lengths: bool = True,
     ) -> None:
         super().__init__()
-        if kernel not in get_args(Kernel):
-            msg = f"kernel must be one of {get_args(Kernel)}, not {kernel!r}"
-            raise ValueError(msg)
-        for name, value in (("hidden", hidden), ("heads", heads)):
-            if value < 1:
-                msg = f"{name} must be at least 1, not {value}"
-                raise ValueError(msg)
         self.kernel = "fused" if kernel == "fused" and compiles(heads * hidden) else "pyg"
         self.lidar_range = lidar_range if edge_lengths else math.inf  # the fixed edges' become 0
         self.edge_lengths = edge_lengths
@@ -136,11 +131,9 @@ class Critic(nn.Module):
             to ``[*B, 1]``, or ``"concat"`` to ``[*B, 9]``.
     """
 
+    @checked
     def __init__(self, encoder: nn.Module, readout: Readout = "mean") -> None:
         super().__init__()
-        if readout not in get_args(Readout):
-            msg = f"readout must be one of {get_args(Readout)}, not {readout!r}"
-            raise ValueError(msg)
         self.encoder = encoder
         self.in_keys = encoder.in_keys
         self.readout = readout
@@ -169,13 +162,14 @@ class GATv2ActorCritic(ActorCritic):
     adjustable = ("kernel", "lidar_range")
     """Settings that the weights do not depend on."""
 
+    @checked
     def __init__(
         self,
-        hidden: int = 16,
-        heads: int = 4,
+        hidden: Annotated[int, Range(1, 1024)] = 16,
+        heads: Annotated[int, Range(1, 64)] = 4,
         critic_readout: Readout = "mean",
         kernel: Kernel = "fused",
-        lidar_range: float = 5.0,
+        lidar_range: Annotated[float, Range(1.415, 100)] = 5.0,
         edge_lengths: bool = True,
     ) -> None:
         def encoder() -> GATv2Encoder:
