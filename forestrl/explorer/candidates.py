@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.viewpoints.paths import Paths
 
 
-@njit(cache=True)
+@compiled
 def candidates(paths: Paths, stride: int, scores: np.ndarray, apart: int, most: int) -> np.ndarray:
     """Picks the cells with the highest scores, none of them close to a better one.
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from forestrl.kernels.compiling import compiled
 
 EDGES = 3
 """Features of an edge: see :func:`put_edge`."""
@@ -43,7 +44,7 @@ class Weights(NamedTuple):
     """``[C]``."""
 
 
-@njit(cache=True)
+@compiled
 def put_edge(row: int, col: int, reach: float, out: np.ndarray) -> None:
     """Writes the features of an edge between candidates so many rows and columns apart.
 
@@ -56,7 +57,7 @@ def put_edge(row: int, col: int, reach: float, out: np.ndarray) -> None:
     out[2] = 1.0 if distance < 0.6 else 0.0
 
 
-@njit(cache=True)
+@compiled
 def _attend(
     x: np.ndarray, edges: np.ndarray, weights: Weights, layer: int, logits: np.ndarray
 ) -> np.ndarray:
@@ -94,7 +95,7 @@ def _attend(
     return result
 
 
-@njit(cache=True)
+@compiled
 def residuals(
     weights: Weights, features: np.ndarray, cells: np.ndarray, stride: int, unit: float
 ) -> np.ndarray:

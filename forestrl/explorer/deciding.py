@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from forestrl.explorer.candidates import candidates
 from forestrl.explorer.compiled import Weights, residuals
 from forestrl.explorer.features import put_features
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.viewpoints.guard import nearest_view, wavers
 from forestrl.planners.viewpoints.paths import Paths
-from forestrl.planners.viewpoints.scores import NOWHERE, Memory, Situation, linear, situation
+from forestrl.planners.viewpoints.scores import NOWHERE, Memory, linear, situation
 from forestrl.planners.viewpoints.sight import Sight
 from forestrl.planners.viewpoints.views import Views
 
@@ -18,9 +18,14 @@ APART = 3
 """How far apart candidates are at least, in fifths of the sensor's range."""
 
 
-@njit(cache=True)
+@compiled
 def compared(
-    views: Views, sight: Sight, stride: int, paths: Paths, memory: Memory, weights: Weights,
+    views: Views,
+    sight: Sight,
+    stride: int,
+    paths: Paths,
+    memory: Memory,
+    weights: Weights,
     share: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Picks the candidates and scores them.
@@ -38,23 +43,26 @@ def compared(
         their cell numbers, the highest linear score first, int64 ``[n]``; their scores, float64
         ``[n]``; their features, float64 ``[n, F]``.
     """
-    here = situation(views, sight, stride, paths.order[0], memory.heading)
-    scores = linear(views, stride, paths, memory, here, weights.linear)
+    here = situation(views, sight, stride, paths.order[0], memory)
+    scores = linear(views, stride, paths, here, weights.linear)
     apart = max(1, int(np.rint(APART * here.unit)))
     cells = candidates(paths, stride, scores, apart, weights.most)
     features = np.empty((len(cells), len(weights.mean)))
     if weights.most == 1 or len(cells) == 0:
         return cells, np.zeros(len(cells)), features
-    put_features(
-        views, sight, stride, paths, memory, here, weights.linear, share, cells, features
-    )
+    put_features(views, sight, stride, paths, here, weights.linear, share, cells, features)
     added = residuals(weights, features, cells, stride, here.unit)
     return cells, features[:, len(weights.linear)] + added, features
 
 
-@njit(cache=True)
+@compiled
 def decide(
-    views: Views, sight: Sight, stride: int, paths: Paths, memory: Memory, weights: Weights,
+    views: Views,
+    sight: Sight,
+    stride: int,
+    paths: Paths,
+    memory: Memory,
+    weights: Weights,
     share: float,
 ) -> tuple[int, bool]:
     """Decides where to walk.

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.viewpoints.paths import Paths, only_here
 from forestrl.planners.viewpoints.scores import (
     TERMS,
-    Memory,
     Situation,
     in_window,
-    put_terms,
+    terms,
     weighed,
     window_share,
 )
@@ -45,7 +44,7 @@ FEATURES = (
 _BLOCK = 5  # cells; side of the blocks in which the unknown is summed
 
 
-@njit(cache=True)
+@compiled
 def pockets(grid: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Gives every unknown cell the size of its 8-connected pocket, int32 ``[cells]``; others 0."""
     size, queue = np.zeros(len(grid), np.int32), np.empty(len(grid), np.int32)
@@ -68,7 +67,7 @@ def pockets(grid: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return size
 
 
-@njit(cache=True)
+@compiled
 def blocks_of_unknown(grid: np.ndarray, stride: int, margin: int) -> np.ndarray:
     """Sums the unknown cells by blocks: number, row and col of the middle, float64 ``[n, 3]``."""
     height, width = len(grid) // stride - 2 * margin, stride - 2 * margin
@@ -88,7 +87,7 @@ def blocks_of_unknown(grid: np.ndarray, stride: int, margin: int) -> np.ndarray:
     return blocks[:n]
 
 
-@njit(cache=True)
+@compiled
 def mean_distance(blocks: np.ndarray, row: int, col: int) -> float:
     """Gives the mean Chebyshev distance of unknown cells from a cell, counted by blocks."""
     total, cells = 0.0, 0.0
@@ -98,7 +97,7 @@ def mean_distance(blocks: np.ndarray, row: int, col: int) -> float:
     return total / max(cells, 1.0)
 
 
-@njit(cache=True)
+@compiled
 def reveal(
     views: Views, sight: Sight, paths: Paths, goal: int, mark: np.ndarray, stamp: int
 ) -> tuple[np.ndarray, int]:
@@ -134,7 +133,7 @@ def reveal(
     return found[:n], first
 
 
-@njit(cache=True)
+@compiled
 def straight_on(views: Views, sight: Sight, cell: int, moves: int) -> tuple[float, float, float]:
     """Goes straight on from a cell in each direction, through the unknown too.
 
@@ -160,13 +159,12 @@ def straight_on(views: Views, sight: Sight, cell: int, moves: int) -> tuple[floa
     return best, second, mean
 
 
-@njit(cache=True)
+@compiled
 def put_features(
     views: Views,
     sight: Sight,
     stride: int,
     paths: Paths,
-    memory: Memory,
     here: Situation,
     weights: np.ndarray,
     share: float,
@@ -190,14 +188,13 @@ def put_features(
         sight: lines of sight.
         stride: of the map.
         paths: from the robot.
-        memory: heading and last goal.
         here: what is common to all cells.
         weights: of the linear score.
         share: the coverage to be reached.
         cells: numbers of the candidates.
         out: float64 ``[n, 34]``; written.
     """
-    grid, unit, terms = views.grid, here.unit, len(weights)
+    grid, unit, f = views.grid, here.unit, len(weights)
     mid, margin = int(np.rint(5 * unit)), here.margin
     straight = max(2, mid)
     size = pockets(grid, sight.steps)
@@ -217,9 +214,10 @@ def put_features(
         cell, x = cells[i], out[i]
         r, c = cell // stride, cell % stride
         length = float(paths.lengths[cell])
-        put_terms(views, stride, paths, memory, here, ends, cell, x)
-        f = terms
-        x[f] = weighed(x[:terms], weights)
+        values = terms(here, stride, ends, cell, paths.gains[cell], views.counts[cell], length)
+        for j in range(f):
+            x[j] = values[j]
+        x[f] = weighed(values, weights)
         revealed, first = reveal(views, sight, paths, cell, mark, i + 1)
         n = float(len(revealed))
         x[f + 1] = n / (50 * unit * unit)
@@ -247,10 +245,10 @@ def put_features(
         corner = max(min(r, here.last_row - r), min(c, here.last_col - c)) - margin
         x[f + 14] = corner / (10 * unit)
         x[f + 15] = 0.0
-        if here.pace > 0:
+        if here.heading[2] > 0:
             dr, dc = first // stride - here.row, first % stride - here.col
-            along = dr * memory.heading[0] + dc * memory.heading[1]
-            x[f + 15] = along / (here.pace * np.sqrt(float(dr * dr + dc * dc)))
+            along = dr * here.heading[0] + dc * here.heading[1]
+            x[f + 15] = along / (here.heading[2] * np.sqrt(float(dr * dr + dc * dc)))
         before = paths.before[cell]
         sideways = abs(r - before // stride) == abs(c - before % stride)
         x[f + 16] = 1.0 if sideways else 0.0

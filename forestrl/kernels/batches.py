@@ -1,21 +1,18 @@
-"""How compiled code runs: loops over a batch on as many threads as torch uses, kept on disk."""
+"""How compiled code runs: loops over a batch, on as many threads as torch uses."""
 
 from __future__ import annotations
 
 import itertools
-import os
-import stat
-import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import update_wrapper
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import torch
-from numba.core.caching import FunctionCache
+
+from forestrl.kernels.compiling import compiled
 
 _PER_THREAD = 16  # maps that are worth starting a thread for
 
@@ -32,7 +29,7 @@ class over_batch:  # noqa: N801 - a decorator
     """
 
     def __init__(self, function: Callable[..., None]) -> None:
-        self.compiled = numba.njit(cache=True, nogil=True)(function)
+        self.compiled = compiled(function, nogil=True)
         update_wrapper(self, function)
 
     def __call__(self, *arrays: Any) -> None:
@@ -70,32 +67,3 @@ def grids(tensor: torch.Tensor) -> np.ndarray:
 def rows(tensor: torch.Tensor) -> np.ndarray:
     """Gives positions ``[*B, 2]`` as one contiguous array ``[b, 2]``."""
     return tensor.detach().reshape(-1, 2).contiguous().numpy()
-
-
-def choose_cache() -> None:
-    """Keeps compiled code in a private temporary folder where there is no other place for it.
-
-    Numba takes the package's folder or the user's cache; with both read-only, as in a hardened
-    container, it would refuse to compile at all.
-    """
-    if numba.config.CACHE_DIR or numba.config.DISABLE_JIT:
-        return
-    try:
-        FunctionCache(choose_cache)
-    except RuntimeError:
-        numba.config.CACHE_DIR = str(_private_folder())
-
-
-def _private_folder() -> Path:
-    """A folder that nobody else can write to: compiled code is read back from it."""
-    folder = Path(tempfile.gettempdir()) / f"forestrl-numba-{os.geteuid()}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.stat(follow_symlinks=False)
-        ours = found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IRWXG | stat.S_IRWXO)
-    except OSError:
-        ours = False
-    return folder if ours else Path(tempfile.mkdtemp(prefix="forestrl-numba-"))
-
-
-choose_cache()

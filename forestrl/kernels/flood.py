@@ -8,9 +8,9 @@ is walled. A cell of it is the number ``(row + PAD) * stride + col + PAD`` with
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from forestrl.functional import Cell
+from forestrl.kernels.compiling import compiled
 
 PAD = 2
 UNREACHED = -1
@@ -19,7 +19,7 @@ _BLOCKED = -2
 _FREE, _OCCUPIED = int(Cell.FREE), int(Cell.OCCUPIED)
 
 
-@njit(cache=True)
+@compiled
 def pad(cells: np.ndarray) -> np.ndarray:
     """Lays a map out flat with obstacles around it."""
     height, width = cells.shape
@@ -31,14 +31,14 @@ def pad(cells: np.ndarray) -> np.ndarray:
     return grid
 
 
-@njit(cache=True)
+@compiled
 def eight_steps(stride: int) -> np.ndarray:
     """Differences of cell number to the eight neighbours, in the order of actions 1 to 8."""
     s = stride
     return np.array([-s - 1, -s, -s + 1, -1, 1, s - 1, s, s + 1], np.int32)
 
 
-@njit(cache=True)
+@compiled
 def no_lengths(grid: np.ndarray) -> np.ndarray:
     """Gives the path lengths before a walk: negative, and different where no walk leads."""
     lengths = np.empty(len(grid), np.int32)
@@ -47,7 +47,7 @@ def no_lengths(grid: np.ndarray) -> np.ndarray:
     return lengths
 
 
-@njit(cache=True)
+@compiled
 def flood(
     steps: np.ndarray, lengths: np.ndarray, queue: np.ndarray, head: int, tail: int, target: int
 ) -> tuple[int, int]:
@@ -77,7 +77,7 @@ def flood(
     return head, tail
 
 
-@njit(cache=True)
+@compiled
 def walk(grid: np.ndarray, steps: np.ndarray, source: int) -> tuple[np.ndarray, np.ndarray, int]:
     """Walks breadth-first from a cell to the end: lengths, the cells reached, how many."""
     lengths = no_lengths(grid)

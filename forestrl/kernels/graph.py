@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor
 
 from forestrl.functional import DISPLACEMENTS, FEATURES, WAYPOINTS, Cell, Graph
 from forestrl.kernels.batches import grids, over_batch, rows
+from forestrl.kernels.compiling import compiled
 
 _DISPLACEMENTS = DISPLACEMENTS.numpy()
 _UNKNOWN, _FREE = int(Cell.UNKNOWN), int(Cell.FREE)
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _mark_frontier(cells: np.ndarray, frontier: np.ndarray) -> int:
     """Marks the frontier of a map and counts its cells."""
     height, width = cells.shape
@@ -35,7 +35,7 @@ def _mark_frontier(cells: np.ndarray, frontier: np.ndarray) -> int:
     return count
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _window_counts(
     cells: np.ndarray, frontier: np.ndarray, row: int, col: int, reach: int
 ) -> tuple[int, int, int]:
@@ -50,7 +50,7 @@ def _window_counts(
     return free, unknown, border
 
 
-@njit(cache=True)
+@compiled
 def _sorted_frontier(frontier: np.ndarray, row: int, col: int, count: int) -> np.ndarray:
     """Lists the frontier's cells as row-major indices, nearest to (row, col) first."""
     height, width = frontier.shape
@@ -66,7 +66,7 @@ def _sorted_frontier(frontier: np.ndarray, row: int, col: int, count: int) -> np
     return order % (height * width)
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _nearest_waypoint(row: int, col: int) -> tuple[int, np.int64]:
     """Finds the waypoint (1 to 8) nearest to an offset from the agent, and the square distance."""
     best, best_square = 0, np.int64(1) << 40
@@ -77,7 +77,7 @@ def _nearest_waypoint(row: int, col: int) -> tuple[int, np.int64]:
     return best, best_square
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _write_counts(
     x: np.ndarray, cells: np.ndarray, frontier: np.ndarray, row: int, col: int, window: int
 ) -> None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor
 
 from forestrl.functional import Cell, SightLines
 from forestrl.kernels.batches import over_batch, rows
+from forestrl.kernels.compiling import compiled
 
 _UNKNOWN, _FREE, _OCCUPIED = int(Cell.UNKNOWN), int(Cell.FREE), int(Cell.OCCUPIED)
 
 
-@njit(cache=True)
+@compiled
 def _reveal(
     trees: np.ndarray, cells: np.ndarray, width: int, row: int, col: int, offsets: np.ndarray,
     between: np.ndarray,
@@ -33,7 +33,7 @@ def _reveal(
     return new
 
 
-@njit(cache=True)
+@compiled
 def _covered(cells: np.ndarray, traversable: np.ndarray) -> np.float32:
     """Gives the explored share of the traversable cells; 32-bit counters, so that it vectorises."""
     known, total = np.int32(0), np.int32(0)

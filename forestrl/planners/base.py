@@ -35,13 +35,17 @@ class ClassicalPlanner(TensorDictModuleBase):
     Args:
         reads: keys that :meth:`plan` needs besides the agent's map and position.
         remembers: keys that it writes, and finds again at the next step.
+        can_cycle: whether a position that returns shows a cycle; False for a planner that decides
+            by what it remembers too, and has a guard of its own.
     """
 
-    def __init__(self, reads: Sequence[Key] = (), remembers: Sequence[Key] = ()) -> None:
+    def __init__(
+        self, reads: Sequence[Key] = (), remembers: Sequence[Key] = (), can_cycle: bool = True
+    ) -> None:
         self.in_keys = [K.CELLS, K.POSITION, *reads]
         self.out_keys = [K.ACTION, K.STATUS, _KNOWN, _AGE, _ANCHOR, *remembers]
         super().__init__()
-        self.remembers = tuple(remembers)
+        self.remembers, self.can_cycle = tuple(remembers), can_cycle
 
     @abstractmethod
     def plan(self, entries: dict[Key, Tensor], changed: Tensor) -> tuple[Tensor, Tensor]:
@@ -66,7 +70,9 @@ class ClassicalPlanner(TensorDictModuleBase):
         age = torch.where(changed, 0, known if age is None else age + 1)
         anchor = position if anchor is None else anchor
         returned = ~changed & (position == anchor).all(-1) & (status == Status.EXPLORING)
-        status = torch.where(returned, int(Status.CYCLE), status).to(torch.int8)
+        if self.can_cycle:
+            status = torch.where(returned, int(Status.CYCLE), status)
+        status = status.to(torch.int8)
         anchor = torch.where(((age & (age - 1)) == 0).unsqueeze(-1), position, anchor)
         action = torch.full_like(known, F.NULL_ACTION)
         self._plan_the_rest(tensordict, changed, action, status)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor
 
 from forestrl.functional import Cell
 from forestrl.kernels.batches import grids, rows
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import PAD
 from forestrl.status import Status
 
@@ -20,7 +20,7 @@ EXPLORING, COVERED = int(Status.EXPLORING), int(Status.COVERED)
 NO_REACHABLE_FRONTIER = int(Status.NO_REACHABLE_FRONTIER)
 
 
-@njit(cache=True)
+@compiled
 def first_action(
     lengths: np.ndarray, steps: np.ndarray, source: int, goal: int, queue: np.ndarray
 ) -> int:
@@ -48,7 +48,7 @@ def first_action(
     return best + 1
 
 
-@njit(cache=True)
+@compiled
 def has_frontier(grid: np.ndarray, steps: np.ndarray, stride: int) -> bool:
     """Tells whether a known free cell has an unknown 8-neighbour."""
     for cell in range(PAD * stride, len(grid) - PAD * stride):
@@ -59,7 +59,7 @@ def has_frontier(grid: np.ndarray, steps: np.ndarray, stride: int) -> bool:
     return False
 
 
-@njit(cache=True)
+@compiled
 def status_at_end(grid: np.ndarray, steps: np.ndarray, stride: int) -> int:
     """Says why there is nowhere to go: all is covered, or the rest cannot be reached."""
     return NO_REACHABLE_FRONTIER if has_frontier(grid, steps, stride) else COVERED

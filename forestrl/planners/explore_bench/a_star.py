@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from forestrl.functional import Cell
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import eight_steps
 
 _FREE = int(Cell.FREE)
 _ROOM = 512  # entries of the heap at first
 
 
-@njit(cache=True)
+@compiled
 def _push(keys: np.ndarray, cells: np.ndarray, size: int, key: float, cell: int) -> None:
     """Adds an entry to a heap ordered by key, then cell."""
     i = size
@@ -25,7 +25,7 @@ def _push(keys: np.ndarray, cells: np.ndarray, size: int, key: float, cell: int)
     keys[i], cells[i] = key, cell
 
 
-@njit(cache=True)
+@compiled
 def _pop(keys: np.ndarray, cells: np.ndarray, size: int) -> int:
     """Takes the first cell from a heap of the given size."""
     first = cells[0]
@@ -46,7 +46,7 @@ def _pop(keys: np.ndarray, cells: np.ndarray, size: int) -> int:
     return first
 
 
-@njit(cache=True)
+@compiled
 def a_star_action(truth: np.ndarray, stride: int, source: int, goal: int) -> int:
     """Gives the first action of A*'s path, 0 if there is none.
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from forestrl.functional import Cell
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import PAD
 
 _UNKNOWN, _FREE = int(Cell.UNKNOWN), int(Cell.FREE)
 
 
-@njit(cache=True)
+@compiled
 def published_frontier(grid: np.ndarray, stride: int) -> np.ndarray:
     """Lists unknown cells beside a free one that is not alone, in row-major order.
 
@@ -36,7 +36,7 @@ def published_frontier(grid: np.ndarray, stride: int) -> np.ndarray:
     return found[:count]
 
 
-@njit(cache=True)
+@compiled
 def corrected_frontier(
     grid: np.ndarray, steps: np.ndarray, stride: int, lengths: np.ndarray
 ) -> np.ndarray:
@@ -52,7 +52,7 @@ def corrected_frontier(
     return found[:count]
 
 
-@njit(cache=True)
+@compiled
 def _beside_reached(found: np.ndarray, steps: np.ndarray, lengths: np.ndarray) -> int:
     """Keeps the listed cells beside one that can be reached, and returns how many they are."""
     count = 0
@@ -65,7 +65,7 @@ def _beside_reached(found: np.ndarray, steps: np.ndarray, lengths: np.ndarray) -
     return count
 
 
-@njit(cache=True)
+@compiled
 def _close(stride: int) -> np.ndarray:
     """Differences of cell number to the twelve cells at a Manhattan distance of 1 or 2."""
     near = np.empty(12, np.int32)
@@ -78,7 +78,7 @@ def _close(stride: int) -> np.ndarray:
     return near
 
 
-@njit(cache=True)
+@compiled
 def _first_grown(
     members: np.ndarray, tied: np.ndarray, state: np.ndarray, close: np.ndarray
 ) -> int:
@@ -109,7 +109,7 @@ def _first_grown(
                 return members[i]
 
 
-@njit(cache=True)
+@compiled
 def _centre(members: np.ndarray, state: np.ndarray, close: np.ndarray, stride: int) -> int:
     """Gives the member with the least Manhattan distance to their mean, the first grown of them."""
     n = len(members)
@@ -127,7 +127,7 @@ def _centre(members: np.ndarray, state: np.ndarray, close: np.ndarray, stride: i
     return _first_grown(members, tied, state, close)
 
 
-@njit(cache=True)
+@compiled
 def clusters(found: np.ndarray, size: int, stride: int) -> tuple[np.ndarray, np.ndarray]:
     """Groups frontier cells: two are in one cluster if a chain of Manhattan distances <= 2 joins.
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor
 
 from forestrl.functional import Cell
 from forestrl.kernels.batches import over_batch, rows
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import PAD, eight_steps, flood, no_lengths, pad, walk
 from forestrl.planners.explore_bench.clusters import clusters, corrected_frontier
 from forestrl.planners.explore_bench.published import towards
@@ -26,7 +26,7 @@ _PENALTY = 5.0  # of a cell, for each time it is in the virtual path
 _LONGEST = 3000  # moves of the virtual path
 
 
-@njit(cache=True)
+@compiled
 def _nearest(lengths: np.ndarray, steps: np.ndarray, centres: np.ndarray) -> int:
     """Gives the cluster with the shortest path, the first on ties, as the cell to go to.
 
@@ -44,7 +44,7 @@ def _nearest(lengths: np.ndarray, steps: np.ndarray, centres: np.ndarray) -> int
     return best
 
 
-@njit(cache=True)
+@compiled
 def _potential(
     steps: np.ndarray,
     lengths: np.ndarray,
@@ -66,7 +66,7 @@ def _potential(
     return potential, least
 
 
-@njit(cache=True)
+@compiled
 def _downhill(
     grid: np.ndarray, steps: np.ndarray, source: int, centres: np.ndarray, sizes: np.ndarray
 ) -> int:
@@ -106,7 +106,7 @@ def _downhill(
     return -1
 
 
-@njit(cache=True)
+@compiled
 def _find_goal(
     grid: np.ndarray, steps: np.ndarray, stride: int, source: int, downhill: bool
 ) -> int:

@@ -6,11 +6,11 @@ Both forget everything between steps, and plan the way to their goal in the true
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from torch import Tensor
 
 from forestrl.functional import Cell
 from forestrl.kernels.batches import grids, over_batch
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import PAD, eight_steps, flood, no_lengths, pad, walk
 from forestrl.planners.explore_bench.a_star import a_star_action
 from forestrl.planners.explore_bench.clusters import clusters, published_frontier
@@ -28,7 +28,7 @@ _PENALTY = 5.0  # of a cell, for each time it is in the virtual path
 _NOTHING = 10000.0  # potential and distance before the first move
 
 
-@njit(cache=True)
+@compiled
 def towards(truth: np.ndarray, stride: int, source: int, goal: int) -> tuple[int, int]:
     """Gives action and status for a goal."""
     if goal == source:
@@ -39,7 +39,7 @@ def towards(truth: np.ndarray, stride: int, source: int, goal: int) -> tuple[int
     return action, EXPLORING if action > 0 else NO_REACHABLE_FRONTIER
 
 
-@njit(cache=True)
+@compiled
 def _pad_truth(trees: np.ndarray) -> np.ndarray:
     truth = np.empty(trees.shape, np.uint8)
     for r in range(trees.shape[0]):
@@ -48,7 +48,7 @@ def _pad_truth(trees: np.ndarray) -> np.ndarray:
     return pad(truth)
 
 
-@njit(cache=True)
+@compiled
 def _first_free_around(grid: np.ndarray, stride: int, centre: int) -> int:
     """Gives the first free cell of the 3 x 3 around a cell in row-major order, -1 if none is."""
     for row in range(-stride, stride + 1, stride):
@@ -89,7 +89,7 @@ def _cost(
             action[b], status[b] = towards(_pad_truth(trees[b]), stride, source, goal)
 
 
-@njit(cache=True)
+@compiled
 def _potential(
     four: np.ndarray,
     lengths: np.ndarray,
@@ -113,7 +113,7 @@ def _potential(
     return potential, least
 
 
-@njit(cache=True)
+@compiled
 def _lowest(
     grid: np.ndarray, stride: int, source: int, centres: np.ndarray, sizes: np.ndarray
 ) -> int:

@@ -6,12 +6,12 @@ from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
-from numba import njit
 from torch import Tensor
 
 from forestrl import keys as K
 from forestrl.functional import Cell
 from forestrl.kernels.batches import over_batch
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import PAD, eight_steps, pad, walk
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.steps import EXPLORING, arguments, first_action, status_at_end
@@ -20,7 +20,7 @@ from forestrl.settings import Range, checked
 _UNKNOWN = int(Cell.UNKNOWN)
 
 
-@njit(cache=True)
+@compiled
 def _unknown_in_window(grid: np.ndarray, cell: int, stride: int, width: int, reach: int) -> int:
     """Counts the unknown cells of the arena in the window around a cell."""
     row, col = cell // stride - PAD, cell % stride - PAD

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor
 
 from forestrl.functional import SightLines
 from forestrl.kernels.batches import grids, over_batch, rows
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.hindsight.known_arena import (
     NEVER,
     World,
@@ -23,7 +23,7 @@ _WARM, _COLD = 3.0, 0.2  # temperatures at the beginning and the end, steps
 _SEED = np.uint64(0x9E3779B97F4A7C15)
 
 
-@njit(cache=True)
+@compiled
 def _greedy(
     world: World,
     cell: int,
@@ -57,7 +57,7 @@ def _greedy(
     return size, steps
 
 
-@njit(cache=True)
+@compiled
 def _draw(state: np.ndarray, below: int) -> int:
     """Draws a whole number from 0 to ``below - 1`` (xorshift64)."""
     x = state[0]
@@ -68,7 +68,7 @@ def _draw(state: np.ndarray, below: int) -> int:
     return int((x >> np.uint64(33)) % np.uint64(below))
 
 
-@njit(cache=True)
+@compiled
 def _vary(order: np.ndarray, size: int, new: np.ndarray, kind: int, state: np.ndarray) -> None:
     """Writes a reordered tour: a part of it reversed (2-opt), or one to three moved (Or-opt)."""
     new[:size] = order[:size]
@@ -88,7 +88,7 @@ def _vary(order: np.ndarray, size: int, new: np.ndarray, kind: int, state: np.nd
     new[b : b + length] = order[a : a + length]
 
 
-@njit(cache=True)
+@compiled
 def _improve(
     world: World, order: np.ndarray, size: int, places: np.ndarray, goal: int, iterations: int
 ) -> tuple[np.ndarray, np.ndarray, int]:

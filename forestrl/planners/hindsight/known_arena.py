@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import PAD, eight_steps, pad, walk
 
 NEVER = 1 << 30  # later than any step
@@ -32,7 +32,7 @@ class World(NamedTuple):
     """Cells that are seen after a move and not before it, one list after the other."""
 
 
-@njit(cache=True)
+@compiled
 def describe(
     trees: np.ndarray, row: int, col: int, offsets: np.ndarray, between: np.ndarray
 ) -> World:
@@ -73,7 +73,7 @@ def describe(
     return World(near, first, seen[:total], first_new, new)
 
 
-@njit(cache=True)
+@compiled
 def _moves(near: np.ndarray, first: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lists what each move shows that its first cell does not."""
     n = len(near)
@@ -96,7 +96,7 @@ def _moves(near: np.ndarray, first: np.ndarray, seen: np.ndarray) -> tuple[np.nd
     return first_new, new[:total]
 
 
-@njit(cache=True)
+@compiled
 def distances(near: np.ndarray, source: int, lengths: np.ndarray, queue: np.ndarray) -> None:
     """Writes the number of moves from a cell to every other."""
     lengths[:] = -1
@@ -113,7 +113,7 @@ def distances(near: np.ndarray, source: int, lengths: np.ndarray, queue: np.ndar
                 tail += 1
 
 
-@njit(cache=True)
+@compiled
 def look(world: World, cell: int, known: np.ndarray) -> int:
     """Takes a whole scan from a cell and returns how much is new."""
     count = 0
@@ -124,7 +124,7 @@ def look(world: World, cell: int, known: np.ndarray) -> int:
     return count
 
 
-@njit(cache=True)
+@compiled
 def go(
     world: World,
     cell: int,
@@ -177,7 +177,7 @@ def go(
     return cell, steps, count, when
 
 
-@njit(cache=True)
+@compiled
 def follow(
     world: World,
     order: np.ndarray,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.viewpoints.paths import Paths
 from forestrl.planners.viewpoints.scores import NOWHERE, Memory
 from forestrl.planners.viewpoints.views import UNKNOWN, Views
 
 
-@njit(cache=True)
+@compiled
 def wavers(views: Views, paths: Paths, memory: Memory) -> bool:
     """Tells whether nothing new was seen for longer than the longest path takes.
 
@@ -25,7 +24,7 @@ def wavers(views: Views, paths: Paths, memory: Memory) -> bool:
     return memory.idle[1] > paths.lengths[paths.order[-1]]
 
 
-@njit(cache=True)
+@compiled
 def nearest_view(views: Views, paths: Paths) -> int:
     """Finds the nearest cell from which something could be seen; ``NOWHERE`` if there is none.
 

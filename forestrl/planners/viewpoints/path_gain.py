@@ -7,11 +7,11 @@ from typing import Annotated
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor
 
 from forestrl import keys as K
 from forestrl.kernels.batches import grids, over_batch, rows
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.steps import EXPLORING, status_at_end
 from forestrl.planners.viewpoints.paths import first_step, paths_from
@@ -91,7 +91,7 @@ def remembered_views(entries: dict[Key, Tensor], lines: Sight) -> Sequence[np.nd
     return grid.numpy(), seen.numpy().view(np.uint64), counts.numpy()
 
 
-@njit(cache=True)
+@compiled
 def look(views: Views, lines: Sight, cells: np.ndarray, row: int, col: int) -> int:
     """Brings the views to the robot's map and cell; returns the number of that cell."""
     update(views, lines, cells)
@@ -127,7 +127,7 @@ def _plan(
             status[b] = EXPLORING
 
 
-@njit(cache=True)
+@compiled
 def action_to(lines: Sight, source: int, target: int) -> int:
     """Gives the action that leads to a neighbouring cell."""
     for i in range(8):

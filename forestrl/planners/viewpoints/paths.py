@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import UNREACHED, no_lengths
 from forestrl.planners.viewpoints.sight import WORD, Sight, popcount
 from forestrl.planners.viewpoints.views import Views
@@ -25,7 +25,7 @@ class Paths(NamedTuple):
     """The cells within reach by their lengths, the robot's first, int32 ``[n]``."""
 
 
-@njit(cache=True)
+@compiled
 def only_here(views: Views, here: int, there: int, shift: int) -> int:
     """Counts what could be seen from a cell and not from its neighbour.
 
@@ -54,7 +54,7 @@ def only_here(views: Views, here: int, there: int, shift: int) -> int:
     return count
 
 
-@njit(cache=True)
+@compiled
 def paths_from(views: Views, sight: Sight, source: int) -> Paths:
     """Walks breadth-first from the robot, keeping for each cell the way that reveals most.
 
@@ -94,7 +94,7 @@ def paths_from(views: Views, sight: Sight, source: int) -> Paths:
     return Paths(lengths, gains, before, order[:tail])
 
 
-@njit(cache=True)
+@compiled
 def first_step(paths: Paths, goal: int) -> int:
     """Gives the first cell of the way to a goal that is not the robot's own cell."""
     cell = goal

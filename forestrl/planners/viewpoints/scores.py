@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.viewpoints.paths import Paths
 from forestrl.planners.viewpoints.sight import Sight
 from forestrl.planners.viewpoints.views import UNKNOWN, Views
@@ -66,19 +66,21 @@ class Situation(NamedTuple):
     """Reach of the larger window, cells."""
     known: float
     """Share of the cells that are known."""
-    pace: float
-    """Length of the heading."""
+    heading: tuple[float, float, float]
+    """Running sum of the last moves, (row, col), and its length."""
+    goal: int
+    """The goal of the step before as a cell number; ``NOWHERE`` at the start."""
     sums: np.ndarray
     """Unknown cells above and to the left, int32 ``[rows + 1, cols + 1]``."""
 
 
-@njit(cache=True)
+@compiled
 def no_memory() -> Memory:
     """Gives the memory before the first step."""
     return Memory(np.zeros(2), np.full(1, NOWHERE, np.int64), np.zeros(2, np.int64))
 
 
-@njit(cache=True)
+@compiled
 def remember(memory: Memory, stride: int, source: int, target: int, goal: int) -> None:
     """Takes note of a move and of the goal it was made for."""
     memory.heading[0] = RUNNING * memory.heading[0] + target // stride - source // stride
@@ -86,7 +88,7 @@ def remember(memory: Memory, stride: int, source: int, target: int, goal: int) -
     memory.goal[0] = goal
 
 
-@njit(cache=True)
+@compiled
 def unknown_sums(grid: np.ndarray, stride: int) -> np.ndarray:
     """Sums the unknown cells above and to the left of every cell, itself included."""
     height = len(grid) // stride
@@ -99,7 +101,7 @@ def unknown_sums(grid: np.ndarray, stride: int) -> np.ndarray:
     return sums
 
 
-@njit(cache=True)
+@compiled
 def in_window(sums: np.ndarray, row: int, col: int, reach: int) -> int:
     """Counts the unknown cells in a window around a cell."""
     top, left = max(row - reach, 0), max(col - reach, 0)
@@ -107,13 +109,13 @@ def in_window(sums: np.ndarray, row: int, col: int, reach: int) -> int:
     return sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
 
 
-@njit(cache=True)
+@compiled
 def window_share(sums: np.ndarray, row: int, col: int, reach: int) -> float:
     """Gives the share of unknown cells in a window; what lies outside the map is known."""
     return in_window(sums, row, col, reach) / (2 * reach + 1) ** 2
 
 
-@njit(cache=True)
+@compiled
 def path_gain(views: Views, paths: Paths, power: float) -> int:
     """Finds the cell with the most to be seen on the way and at the end, for its path length.
 
@@ -130,14 +132,13 @@ def path_gain(views: Views, paths: Paths, power: float) -> int:
     return best
 
 
-@njit(cache=True)
-def situation(
-    views: Views, sight: Sight, stride: int, source: int, heading: np.ndarray
-) -> Situation:
+@compiled
+def situation(views: Views, sight: Sight, stride: int, source: int, memory: Memory) -> Situation:
     """Gathers what the terms of all cells have in common."""
     unit, margin = sight.lidar_range / 5, sight.margin
     sums = unknown_sums(views.grid, stride)
     last_row, last_col = len(views.grid) // stride - 1, stride - 1
+    heading = memory.heading
     return Situation(
         unit,
         source // stride,
@@ -148,76 +149,73 @@ def situation(
         int(np.rint(3 * unit)),
         int(np.rint(10 * unit)),
         1 - sums[-1, -1] / ((last_row + 1 - 2 * margin) * (last_col + 1 - 2 * margin)),
-        np.hypot(heading[0], heading[1]),
+        (heading[0], heading[1], np.hypot(heading[0], heading[1])),
+        memory.goal[0],
         sums,
     )
 
 
-@njit(cache=True)
-def put_terms(
-    views: Views,
-    stride: int,
-    paths: Paths,
-    memory: Memory,
-    here: Situation,
-    ends: float,
-    cell: int,
-    out: np.ndarray,
-) -> None:
-    """Writes the terms of a cell.
+@compiled
+def terms(
+    here: Situation, stride: int, ends: float, cell: int, gain: int, end: int, length: float
+) -> tuple[float, ...]:
+    """Gives the terms of a cell.
 
     Args:
-        views: the map and what could be seen.
-        stride: of the map.
-        paths: from the robot.
-        memory: heading and last goal.
         here: what is common to all cells.
+        stride: of the map.
         ends: how much a cell seen at the end counts against one seen on the way.
         cell: its number.
-        out: the terms; written, float64 ``[14]``.
+        gain: unknown cells that could be seen on the way and at the end, ``G``.
+        end: those that could be seen at the end, ``|S|``.
+        length: of the way, ``L``, moves.
+
+    Returns:
+        the :data:`TERMS`.
     """
     unit = here.unit
-    gain, end, length = paths.gains[cell], views.counts[cell], float(paths.lengths[cell])
     r, c = cell // stride, cell % stride
     log_length = np.log(length)
     around = window_share(here.sums, r, c, here.far)
     border = min(min(r, here.last_row - r), min(c, here.last_col - c)) - here.margin
     dr, dc = r - here.row, c - here.col
-    out[0] = -log_length
-    out[1] = np.log(gain + ends * end)
-    out[2] = length / (10 * unit)
-    out[3] = end / (20 * unit * unit)
-    out[4] = window_share(here.sums, r, c, here.near)
-    out[5] = around
-    out[6] = here.known * log_length
-    out[7] = here.known * around
-    out[8] = border / (10 * unit)
-    out[9] = 1.0 if border <= 5 * unit else 0.0
-    out[10], out[11] = 0.0, 0.0
-    if here.pace > 0:
-        along = dr * memory.heading[0] + dc * memory.heading[1]
-        out[10] = along / (here.pace * np.sqrt(float(dr * dr + dc * dc)))
-    goal = memory.goal[0]
-    if goal != NOWHERE:
-        away = max(abs(r - goal // stride), abs(c - goal % stride))
-        out[11] = 1 / (1 + away / unit)
-    out[12] = gain / length / (10 * unit)
-    out[13] = 1.0 if abs(dr) == abs(dc) else 0.0
+    along, stay = 0.0, 0.0
+    if here.heading[2] > 0:
+        along = dr * here.heading[0] + dc * here.heading[1]
+        along /= here.heading[2] * np.sqrt(float(dr * dr + dc * dc))
+    if here.goal != NOWHERE:
+        stay = 1 / (1 + max(abs(r - here.goal // stride), abs(c - here.goal % stride)) / unit)
+    return (
+        -log_length,
+        np.log(gain + ends * end),
+        length / (10 * unit),
+        end / (20 * unit * unit),
+        window_share(here.sums, r, c, here.near),
+        around,
+        here.known * log_length,
+        here.known * around,
+        border / (10 * unit),
+        1.0 if border <= 5 * unit else 0.0,
+        along,
+        stay,
+        gain / length / (10 * unit),
+        1.0 if abs(dr) == abs(dc) else 0.0,
+    )
 
 
-@njit(cache=True)
-def weighed(terms: np.ndarray, weights: np.ndarray) -> float:
+@compiled
+def weighed(values: tuple[float, ...], weights: np.ndarray) -> float:
     """Gives the linear score of a cell's terms."""
-    score = terms[1]
-    for i in range(len(weights)):
+    score = values[1]
+    for i in range(len(values)):
         if i != 1:
-            score += weights[i] * terms[i]
+            score += weights[i] * values[i]
     return score
 
 
-@njit(cache=True)
+@compiled
 def linear(
-    views: Views, stride: int, paths: Paths, memory: Memory, here: Situation, weights: np.ndarray
+    views: Views, stride: int, paths: Paths, here: Situation, weights: np.ndarray
 ) -> np.ndarray:
     """Gives every cell within reach its linear score.
 
@@ -225,18 +223,19 @@ def linear(
         views: the map and what could be seen.
         stride: of the map.
         paths: from the robot.
-        memory: heading and last goal.
         here: what is common to all cells.
         weights: of the terms, float64 ``[14]``.
 
     Returns:
         the scores, in the order of ``paths.order``; minus infinity where nothing is to be seen.
     """
-    scores, terms = np.full(len(paths.order), -np.inf), np.empty(len(weights))
+    scores = np.full(len(paths.order), -np.inf)
     ends = np.exp(weights[1])
     for i in range(1, len(paths.order)):
         cell = paths.order[i]
-        if paths.gains[cell] > 0:
-            put_terms(views, stride, paths, memory, here, ends, cell, terms)
-            scores[i] = weighed(terms, weights)
+        gain = paths.gains[cell]
+        if gain > 0:
+            length = float(paths.lengths[cell])
+            values = terms(here, stride, ends, cell, gain, views.counts[cell], length)
+            scores[i] = weighed(values, weights)
     return scores

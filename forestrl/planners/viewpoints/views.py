@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from forestrl.functional import Cell
+from forestrl.kernels.compiling import compiled
 from forestrl.planners.viewpoints.sight import Sight, popcount
 
 UNKNOWN, FREE, OCCUPIED = int(Cell.UNKNOWN), int(Cell.FREE), int(Cell.OCCUPIED)
@@ -29,7 +29,7 @@ class Views(NamedTuple):
     """How much that is, ``|S|``, int32 ``[cells]``."""
 
 
-@njit(cache=True)
+@compiled
 def blank(height: int, width: int, sight: Sight) -> Views:
     """Gives the views of a map on which nothing is known."""
     margin, words = sight.margin, sight.bits.shape[1]
@@ -49,7 +49,7 @@ def blank(height: int, width: int, sight: Sight) -> Views:
     return Views(grid, seen, counts)
 
 
-@njit(cache=True)
+@compiled
 def learn(views: Views, sight: Sight, cells: np.ndarray, truth: np.ndarray) -> None:
     """Adds cells to the map, and keeps up what could be seen.
 
@@ -79,7 +79,7 @@ def learn(views: Views, sight: Sight, cells: np.ndarray, truth: np.ndarray) -> N
             spend(views, cells[i])
 
 
-@njit(cache=True)
+@compiled
 def spend(views: Views, cell: int) -> None:
     """Takes note that nothing more can be seen from a cell: a trunk, or where the robot stood.
 
@@ -89,7 +89,7 @@ def spend(views: Views, cell: int) -> None:
     views.counts[cell] = 0
 
 
-@njit(cache=True)
+@compiled
 def update(views: Views, sight: Sight, cells: np.ndarray) -> bool:
     """Brings the views to another map of the same size.
 

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from numba import njit
 
 from forestrl.functional import DISPLACEMENTS, FEATURES, WAYPOINT_EDGES, WAYPOINTS
+from forestrl.kernels.compiling import compiled
 from forestrl.policies.gatv2.vectors import exp, group_sums, load, spread, store, where_positive
 
 _CORE = torch.cat((WAYPOINT_EDGES, torch.arange(WAYPOINTS).expand(2, -1)), -1)  # with self-loops
@@ -83,7 +83,7 @@ class _Scratch(NamedTuple):
     hidden: np.ndarray  # [N, C] layer 1 after ReLU; then its gradient before ReLU
 
 
-@njit(cache=True)
+@compiled
 def _new_layer(nodes, edges, dtype, shape):
     """Allocates one layer's memory."""
     wide, heads = len(shape[0]), len(shape[1])
@@ -99,7 +99,7 @@ def _new_layer(nodes, edges, dtype, shape):
     )
 
 
-@njit(cache=True)
+@compiled
 def _new_scratch(room, net, shapes):
     """Allocates memory for graphs of up to ``room`` frontiers and writes the fixed edges."""
     nodes, edges, dtype = WAYPOINTS + room, _CORE_EDGES + room, net.rows.dtype
@@ -116,7 +116,7 @@ def _new_scratch(room, net, shapes):
     )
 
 
-@njit(cache=True)
+@compiled
 def _link(waypoint, length, count, links):
     """Writes the frontier edges of a graph; tells whether every waypoint is one of 1 to 8."""
     valid = True
@@ -128,25 +128,25 @@ def _link(waypoint, length, count, links):
     return valid
 
 
-@njit(cache=True)
+@compiled
 def _add(array, row, value, lanes):
     """``array[row] += value``."""
     store(array, row, load(array, row, lanes) + value)
 
 
-@njit(cache=True)
+@compiled
 def _leaky(z, slope):
     """LeakyReLU."""
     return where_positive(z, z, slope * z)
 
 
-@njit(cache=True)
+@compiled
 def _relu(y):
     """ReLU that keeps NaN, so that broken weights show in the logits."""
     return where_positive(-1 * y, 0, y)
 
 
-@njit(cache=True)
+@compiled
 def _attend(links, edges, p, slope, a, shape):
     """Scores, softmax and weighted sums at the core nodes (Eqs. 3 to 5)."""
     lanes, heads, hidden = shape
@@ -171,7 +171,7 @@ def _attend(links, edges, p, slope, a, shape):
         store(a.mixed, i, load(a.mixed, i, lanes) * spread(scale, hidden))
 
 
-@njit(cache=True)
+@compiled
 def _attend_backward(links, edges, p, slope, a, shape, d_out, d_p):
     """Adds to ``d_left``, ``d_right`` and ``d_p`` what :func:`_attend` hands back."""
     lanes, heads, hidden = shape
@@ -192,7 +192,7 @@ def _attend_backward(links, edges, p, slope, a, shape, d_out, d_p):
         _add(a.d_right, i, d_z, lanes)
 
 
-@njit(cache=True)
+@compiled
 def _transform(x, nodes, p, a, lanes):
     """The linear maps of layer 1."""
     for i in range(nodes):
@@ -205,7 +205,7 @@ def _transform(x, nodes, p, a, lanes):
         store(a.right, i, right)
 
 
-@njit(cache=True)
+@compiled
 def _transform_backward(x, nodes, a, d_p, lanes):
     """Adds the gradients of the linear maps of layer 1."""
     for i in range(nodes):
@@ -221,7 +221,7 @@ def _transform_backward(x, nodes, a, d_p, lanes):
         store(d_p, _RIGHT + k, right)
 
 
-@njit(cache=True)
+@compiled
 def _encode(x, nodes, net, s, shapes):
     """The forward pass of one graph; leaves the logits in ``s.second.mixed``, without bias."""
     (lanes, _, hidden), (one, _, _) = shapes
@@ -249,7 +249,7 @@ def _encode(x, nodes, net, s, shapes):
     _attend(s.links, edges, net.scalars, net.slope2, s.second, shapes[1])
 
 
-@njit(cache=True)
+@compiled
 def _encode_backward(x, nodes, net, s, shapes, d_logits, d, d2):
     """The backward pass of one graph, after :func:`_encode`; adds to ``d`` and ``d2``."""
     lanes, heads, hidden = shapes[0]
@@ -278,7 +278,7 @@ def _encode_backward(x, nodes, net, s, shapes, d_logits, d, d2):
     _transform_backward(x, nodes, a, d, lanes)
 
 
-@njit(cache=True)
+@compiled
 def _readout_backward(nodes, net, s, shapes, d, d2):
     """Through layer 2's linear maps and ReLU; leaves the gradient in ``s.hidden``."""
     lanes = shapes[0][0]
@@ -298,7 +298,7 @@ def _readout_backward(nodes, net, s, shapes, d, d2):
         store(s.hidden, i, d_y)
 
 
-@njit(cache=True)
+@compiled
 def _chunk(chunk, chunks, graphs, net, shapes, logits, d, d2):
     """Writes one chunk's logits; or reads their gradients if ``d`` is not empty, adding to it."""
     lo, hi = (chunk * len(logits)) // chunks, ((chunk + 1) * len(logits)) // chunks
@@ -322,7 +322,7 @@ def _chunk(chunk, chunks, graphs, net, shapes, logits, d, d2):
     return valid
 
 
-@njit(cache=True)
+@compiled
 def _pack(parameters, constants):
     """Writes the parameters, in :func:`forestrl.policies.gatv2.encoder.encode`'s order, as rows."""
     wide, dtype = len(parameters[0]), parameters[0].dtype
@@ -336,7 +336,7 @@ def _pack(parameters, constants):
     return _Net(p, p2, constants[0], constants[1], constants[2])
 
 
-@njit(cache=True)
+@compiled
 def unpack_gradients(chunks, chunks2, gradients) -> None:
     """Sums the chunks' gradients in order and writes them in the order of ``encode``."""
     p, p2 = chunks[0], chunks2[0]
@@ -351,7 +351,7 @@ def unpack_gradients(chunks, chunks2, gradients) -> None:
     gradients[11][0], gradients[12][0, 0], gradients[13][:] = p2[_EDGE], p2[_ATT], p2[_BIAS]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def run_chunks(part, parts, graphs, parameters, constants, shapes, logits, d, d2) -> bool:
     """Runs one part of the chunks, :func:`_chunk`; tells whether the graphs are valid."""
     net, valid = _pack(parameters, constants), True
