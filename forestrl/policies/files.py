@@ -150,9 +150,8 @@ def _described(header: Mapping[str, str], weights: dict[str, Tensor], source: st
         raise CheckpointError(f"{source} has format {about['format']}, this program reads {FORMAT}")
     if about.pop("sha256") != _checksum(about, weights):
         raise CheckpointError(f"{source} is damaged: its checksum is not that of its content")
-    reads = about["observation"]
-    observation = None if reads is None else Described(**reads)
-    return Policy(Described(**about["model"]), observation, about["training"], weights, source)
+    reads = about["observation"] and Described(**about["observation"])
+    return Policy(Described(**about["model"]), reads, about["training"], weights, source)
 
 
 def _checksum(about: Mapping[str, Any], weights: Mapping[str, Tensor]) -> str:
