@@ -57,7 +57,7 @@ class PolicyIteration:
         arenas: Annotated[int, Range(100, 10_000_000)] = 2500,
         rate: Annotated[float, Range(above=0, high=1)] = 0.03,
         options: Annotated[int, Range(2, 64)] = 5,
-        epochs: Count = 4,
+        epochs: Count = 8,
         batch: Count = 512,
         lr: Annotated[float, Range(above=0, high=1)] = 1e-3,
         sharpness: Annotated[float, Range(above=0, high=1000)] = 3.0,

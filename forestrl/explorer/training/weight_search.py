@@ -22,7 +22,8 @@ _FILE = "search.jsonl"
 class WeightSearch:
     """Searches for weights that take few steps.
 
-    In every generation all members explore the same fresh arenas. Costs are kept in
+    In every generation all members explore the same fresh arenas; now and then the mean of the
+    distribution explores the validation arenas, and the best mean is kept. Costs are kept in
     ``search.jsonl``: a search that goes on asks for the same members again and tells their costs
     from there, so that it ends as if it had never stopped.
 
@@ -39,7 +40,7 @@ class WeightSearch:
     @checked
     def __init__(
         self,
-        generations: Annotated[int, Range(1, 10_000)] = 24,
+        generations: Annotated[int, Range(1, 10_000)] = 48,
         population: Annotated[int, Range(4, 1000)] = 14,
         arenas: Annotated[int, Range(1, 100_000)] = 80,
         spread: Annotated[float, Range(above=0, high=10)] = 0.3,
@@ -67,38 +68,37 @@ class WeightSearch:
         known, best = _read(folder / _FILE), np.inf
         for generation in range(1, self.total + 1):
             members = strategy.ask()
-            if generation > len(known):
-                known.append(self._measure(generation, members, strategy, network, task))
-                lines = "".join(json.dumps(row) + "\n" for row in known)
-                atomic_write(folder / _FILE, lines)
-            row = known[generation - 1]
+            new = generation > len(known)
+            row = (
+                self._explore(generation, members, network, task) if new else known[generation - 1]
+            )
+            metrics = row["metrics"]
+            if new:
+                metrics["search/spread"] = float(strategy.sigma)
             strategy.tell(members, row["costs"])
-            metrics, improved = dict(row["metrics"]), None
-            if metrics.get("eval/steps", np.inf) < best:
-                best = metrics["eval/steps"]
-                improved = _with_weights(network, row["mean"])
-            yield Told(generation, metrics, improved)
+            middle = _with_weights(network, strategy.result.xfavorite)
+            if new:
+                if generation % self.validate_every == 0 or generation == self.total:
+                    found = task.steps(middle.pack(), task.validation)
+                    metrics["eval/steps"] = float(found.mean())
+                known.append(row)
+                lines = "".join(json.dumps(one) + "\n" for one in known)
+                atomic_write(folder / _FILE, lines)
+            improved = metrics.get("eval/steps", np.inf) < best
+            best = min(best, metrics.get("eval/steps", np.inf))
+            yield Told(generation, metrics, middle if improved else None)
 
-    def _measure(
-        self, generation: int, members: list[Any], strategy: Any, network: LinearScore, task: Task
+    def _explore(
+        self, generation: int, members: list[Any], network: LinearScore, task: Task
     ) -> dict[str, Any]:
-        """Lets all members explore; at times also the middle of those before."""
+        """Lets all members explore the same fresh arenas."""
         arenas, _ = task.draw(self.arenas, generation)
         costs = [
             float(task.steps(_with_weights(network, member).pack(), arenas).mean())
             for member in members
         ]
-        metrics = {
-            "search/steps": float(np.mean(costs)),
-            "search/best": float(np.min(costs)),
-            "search/spread": float(strategy.sigma),
-        }
-        order = np.argsort(costs)[: len(costs) // 2]
-        mean = np.mean([members[i] for i in order], 0).tolist()
-        if generation % self.validate_every == 0 or generation == self.total:
-            found = task.steps(_with_weights(network, mean).pack(), task.validation)
-            metrics["eval/steps"] = float(found.mean())
-        return {"costs": costs, "mean": mean, "metrics": metrics}
+        metrics = {"search/steps": float(np.mean(costs)), "search/best": float(np.min(costs))}
+        return {"costs": costs, "metrics": metrics}
 
 
 def _with_weights(network: LinearScore, weights: Any) -> LinearScore:
