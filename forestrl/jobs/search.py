@@ -11,7 +11,7 @@ from omegaconf import DictConfig, OmegaConf
 from torch import nn
 
 from forestrl import build
-from forestrl.command import asked_for, run_folder, typed
+from forestrl.command import asked_for, typed
 from forestrl.evaluation.arenas import draw_arenas
 from forestrl.explorer.training.task import Arenas, Search, Task
 from forestrl.policies.files import POLICY_FILE, save_policy
@@ -28,7 +28,7 @@ def is_search(cfg: DictConfig) -> bool:
     return hasattr(get_class(cfg.algo["_target_"]), "run")
 
 
-def run(cfg: DictConfig) -> float:
+def run(cfg: DictConfig, folder: Path) -> float:
     """Searches to the end; returns the mean steps on the validation arenas, negated, for sweepers.
 
     Raises:
@@ -37,7 +37,6 @@ def run(cfg: DictConfig) -> float:
     for name in asked_for():
         if any(f"{name}.".startswith(f"{each}.") for each in _OF_PPO):
             raise ValueError(f"{name} is not read by this algo: it is for algo=ppo")
-    folder = run_folder(cfg)
     build.prepare(cfg)
     search: Search = instantiate(cfg.algo)
     network = instantiate(cfg.model)

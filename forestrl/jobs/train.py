@@ -153,11 +153,11 @@ def run(cfg: DictConfig) -> float:
     It is that of the last evaluation or, if there is none, of the last episodes; nan if there was
     nothing left to train.
     """
-    if search.is_search(cfg):
-        return search.run(cfg)
     run_dir, resume = run_folder(cfg), cfg.resume is not None
     if resume:
         cfg = resumed(cfg)
+    if search.is_search(cfg):
+        return search.run(cfg, run_dir)
     build.prepare(cfg)
     training = Training(cfg, run_dir)
     if resume:
