@@ -32,7 +32,7 @@ _TRANSFORMS = {"+ filter": "safety", "+ graph": "graph", "+ reward": "reward"}
 
 
 def resized(cfg: DictConfig, size: Any, num_envs: int, room: int = 1) -> DictConfig:
-    """Gives the configuration for other arenas, with trunks, if they are counted, in proportion to the area.
+    """Gives the configuration for other arenas; trunks that are counted in proportion to the area.
 
     Args:
         cfg: the whole configuration; it is not changed.
