@@ -173,7 +173,9 @@ class HardCoreForest(MeasuredForest):
         stays = torch.ones(len(points), dtype=torch.bool, device=points.device)
         pairs = KDTree(points.cpu().numpy()).query_pairs(self.distance, output_type="ndarray")
         stays[torch.from_numpy(pairs[:, 1]).to(points.device)] = False  # the later one of each
-        return points[stays] - self.distance
+        points = points[stays] - self.distance
+        inside = (points >= 0) & (points <= torch.tensor(sides, device=points.device))
+        return points[inside.all(-1)]
 
     def describe(self) -> str:
         """Says how the trunks stand, and on what."""
