@@ -9,7 +9,7 @@ from omegaconf import DictConfig
 
 from forestrl.command import command
 from forestrl.settings import Range, not_allowed
-from forestrl.shared import Count, CountOrZero, Seed, Side, WithPolicy
+from forestrl.shared import Count, CountOrZero, Seed, Side, WithPolicy, require_forest
 
 
 @dataclass(kw_only=True)
@@ -33,7 +33,8 @@ class Settings(WithPolicy):
 
     @staticmethod
     def check(cfg: DictConfig) -> None:
-        """Refuses another policy than the learned one."""
+        """Refuses another policy than the learned one, and another world than a forest."""
+        require_forest(cfg)
         if cfg.policy.name != "learned":
             raise not_allowed("policy", cfg.policy.name, "the learned one is compared with random")
 

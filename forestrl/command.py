@@ -231,7 +231,7 @@ def _with_whole_names(text: str, cfg: DictConfig) -> str:
     for name, raw in leaves(cfg).items():
         names.setdefault(name.rpartition(".")[2], set()).add(followed(raw) or name)
     whole = {last: next(iter(found)) for last, found in names.items() if len(found) == 1}
-    return re.sub(r"(?<![\w.])(\w+)(?==)", lambda match: whole.get(match[1], match[1]), text)
+    return re.sub(r"(?<![\w./])(\w+)(?==)", lambda match: whole.get(match[1], match[1]), text)
 
 
 def _meant(name: str, cause: BaseException | None) -> str:

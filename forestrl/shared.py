@@ -38,6 +38,18 @@ class World:
             raise not_allowed("env.num_envs", None, "it must be a whole number")
 
 
+def require_forest(cfg: DictConfig) -> None:
+    """Refuses a world whose size and density a command cannot vary.
+
+    Raises:
+        ValueError: if the env has no ``size`` and ``n_trees``.
+    """
+    if not {"size", "n_trees"} <= cfg.env.keys():
+        world = cfg.env.world and cfg.env.world.get("_target_")
+        reason = "this command varies env.size and env.n_trees, as env=forest has them"
+        raise not_allowed("env.world", world, reason)
+
+
 @dataclass(kw_only=True)
 class WithPolicy(World):
     """A command that shows a policy the world; its own settings say which arenas and how long."""

@@ -11,7 +11,7 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 
 from forestrl import build
 from forestrl.cli import COMMANDS
-from forestrl.config import CONF_DIR
+from forestrl.config import CONF_DIR, followed
 from forestrl.jobs.train import Training
 from forestrl.loggers import NoLogger, Run
 from forestrl.policies.gatv2 import GATv2ActorCritic
@@ -56,7 +56,6 @@ SWEEPS = {
 EXEMPT = {"num_envs", "seed", "device", "world"}
 GIVEN = {"run", "models", "settings"}  # by the assembler
 REQUIRED = {"start"}  # no default in Python
-SHORT = {"size", "n_trees", "tree_radius"}  # env's names for the settings of its world
 VARIANTS = {
     ("env", "tiny"),
     ("env", "forest75"),
@@ -141,11 +140,27 @@ def defaults_of(node):
     return {name: default for name, default in defaults.items() if name not in GIVEN}
 
 
+def names_for_the_world(node):
+    """The env's names for the settings of its world."""
+    world = OmegaConf.to_container(node, resolve=False).get("world") or {}
+    return {followed(raw).removeprefix("env.") for raw in world.values() if followed(raw)}
+
+
 @pytest.mark.parametrize(("group", "option"), CONSTRUCTED)
 def test_keys_are_the_constructors_arguments(group, option):
     node = node_of(group, option)
-    short = SHORT if group == "env" else set()
+    short = names_for_the_world(node) if group == "env" else set()
     assert node.keys() - {"_target_", "name"} - short - REQUIRED == defaults_of(node).keys()
+
+
+@pytest.mark.parametrize("option", [option for group, option in OPTIONS if group == "env"])
+def test_a_worlds_keys_and_values_are_those_of_its_constructor(option):
+    world = node_of("env", option).get("world")
+    if world is not None:
+        defaults = defaults_of(world)
+        assert world.keys() - {"_target_"} == defaults.keys()
+        values = {k: tuple(v) if isinstance(v, ListConfig) else v for k, v in world.items()}
+        assert ("env", option) in VARIANTS or defaults.items() <= values.items()
 
 
 def test_the_worlds_settings_go_by_short_names():

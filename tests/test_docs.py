@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import re
 import shlex
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.commands import train
+from tests.commands import compose, train
 
 ROOT = Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"^```(python|yaml|bash)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -63,6 +64,31 @@ def test_the_page_on_extending_runs_as_it_stands(tmp_path):
     assert (tmp_path / "logged/metrics.jsonl").read_text().count("frames") == 4
     assert (tmp_path / "multirun/mine/table.md").is_file()
     assert list(tmp_path.glob("outputs/render/*/episode.gif"))
+
+
+def test_the_commands_on_worlds_are_configured_as_they_are_typed():
+    text = "".join(text for kind, text in blocks("worlds.md") if kind == "bash")
+    commands = [shlex.split(line) for line in text.replace("\\\n", " ").splitlines()]
+    assert len(commands) >= 6
+    for program, command, *rest in commands:
+        assert program == "forestrl"
+        assert compose(command, *(word for word in rest if not word.startswith("hydra.")))
+
+
+def test_the_numbers_on_worlds_are_those_of_the_results():
+    row = re.compile(r"^\| `(\w+)` \| `(\w+)` \| (.+) \| (.+) \| `(forestrl .+)` \|$", re.MULTILINE)
+    rows = row.findall((ROOT / "docs/worlds.md").read_text())
+    assert len(rows) >= 4
+    for world, policy, *steps, command in rows:
+        summary = json.loads(
+            (ROOT / f"multirun/results/worlds/{world}/{policy}/summary.json").read_text()
+        )
+        found = {each["measure"]: each for each in summary["measures"]}
+        assert summary["meta"]["command"] == command
+        assert (found["collisions"]["mean"], found["reached_98"]["mean"]) == (0, 1)
+        for share, text in zip((80, 98), steps, strict=True):
+            mean, low, high = (found[f"steps_to_{share}"][key] for key in ("mean", "low", "high"))
+            assert text == f"{mean:.0f} [{low:.0f}, {high:.0f}]"
 
 
 def explained():

@@ -34,10 +34,14 @@ def test_wheel_contains_the_configuration(wheel):
     assert {f"forestrl/{name}" for name in conf} <= wheel.keys()
 
 
-def test_wheel_contains_the_released_policies(wheel):
-    assets = ROOT / "forestrl" / "policies" / "assets"
+@pytest.mark.parametrize(
+    ("room", "one"),
+    [("policies", "paper.safetensors"), ("envs/worlds", "stems/LICENSE")],
+)
+def test_wheel_contains_the_released_policies_and_worlds(wheel, room, one):
+    assets = ROOT / "forestrl" / room / "assets"
     files = {path.relative_to(ROOT).as_posix() for path in assets.rglob("*") if path.is_file()}
-    assert files <= wheel.keys()
+    assert (assets / one).is_file() and files <= wheel.keys()
 
 
 def test_wheel_contains_the_package_and_nothing_beside_it(wheel):

@@ -37,13 +37,16 @@ def sample_trees(
     return rasterize(centre, low + (high - low) * draws[..., 2], shape=shape)
 
 
-def rasterize(centre: Tensor, radius: Tensor, *, shape: tuple[int, int]) -> Tensor:
+def rasterize(
+    centre: Tensor, radius: Tensor, *, shape: tuple[int, int], touching: bool = False
+) -> Tensor:
     """Marks the cells whose centre lies within a trunk, its rim included.
 
     Args:
         centre: trunk centres, float ``[*B, n, 2]``, in cells; cell (i, j) spans [i, i+1).
         radius: float ``[*B, n]``, in cells.
         shape: rows and columns of the arena, cells.
+        touching: mark every cell that a trunk touches, so that none is too thin to be there.
 
     Returns:
         bool ``[*B, H, W]``.
@@ -56,7 +59,10 @@ def rasterize(centre: Tensor, radius: Tensor, *, shape: tuple[int, int]) -> Tens
     span = torch.arange(-reach, reach + 1, device=radius.device)
     patch = torch.cartesian_prod(span, span)  # (P, 2), the cells a trunk can touch
     index = centre.floor().long().unsqueeze(-2) + patch  # (*B, n, P, 2)
-    distance = (index + 0.5 - centre.unsqueeze(-2)).square().sum(-1).sqrt()
+    offset = index + 0.5 - centre.unsqueeze(-2)
+    if touching:  # to the nearest point of the cell, not to its centre
+        offset = (offset.abs() - 0.5).clamp(min=0)
+    distance = offset.square().sum(-1).sqrt()
     hit = (distance <= radius.unsqueeze(-1)) & inside(index, shape)
     flat = (index[..., 0] * width + index[..., 1]).clamp(0, area - 1)
     occupied.scatter_reduce_(-1, flat.flatten(-2), hit.flatten(-2).to(torch.uint8), "amax")

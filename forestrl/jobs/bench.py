@@ -32,7 +32,7 @@ _TRANSFORMS = {"+ filter": "safety", "+ graph": "graph", "+ reward": "reward"}
 
 
 def resized(cfg: DictConfig, size: Any, num_envs: int, room: int = 1) -> DictConfig:
-    """Gives the configuration for other arenas, with trunks in proportion to the area.
+    """Gives the configuration for other arenas; trunks that are counted in proportion to the area.
 
     Args:
         cfg: the whole configuration; it is not changed.
@@ -43,8 +43,10 @@ def resized(cfg: DictConfig, size: Any, num_envs: int, room: int = 1) -> DictCon
     changed = cfg.copy()
     OmegaConf.update(changed, "env.num_envs", num_envs)
     if size is not None:
-        n_trees = round(cfg.env.n_trees * _area(size) / _area(cfg.env.size))
-        OmegaConf.update(changed, "env", {"size": size, "n_trees": n_trees})
+        OmegaConf.update(changed, "env.size", size)
+        if "n_trees" in cfg.env:
+            n_trees = round(cfg.env.n_trees * _area(size) / _area(cfg.env.size))
+            OmegaConf.update(changed, "env.n_trees", n_trees)
     if "max_frontiers" in cfg.graph:
         most = max(room, cfg.graph.max_frontiers)
         OmegaConf.update(changed, "graph.max_frontiers", most)

@@ -19,6 +19,7 @@ from forestrl.evaluation.metrics import eval_metrics
 from forestrl.evaluation.parts import Parts
 from forestrl.evaluation.picture import Player, draw_episode
 from forestrl.evaluation.report import table, write_report
+from forestrl.jobs.worlds import say_world
 from forestrl.loggers import Logger, NoLogger
 from forestrl.paper import coverage_of
 
@@ -52,6 +53,7 @@ def run(cfg: DictConfig) -> float:
         raise ValueError(f"resume={cfg.resume} is finished: there is nothing left to do")
     build.prepare(cfg)
     cfg = build.as_trained(cfg, asked_for())
+    say_world(cfg)
     policy, about = build.make_policy(cfg, asked_for())
     logger = build.make_logger(cfg, folder)
     failed = True

@@ -9,15 +9,17 @@ from omegaconf import DictConfig, OmegaConf
 from forestrl import build
 from forestrl.command import asked_for, run_folder
 from forestrl.evaluation.picture import Player, draw_episode
+from forestrl.jobs.worlds import say_world
 
 
 def run(cfg: DictConfig) -> None:
     """Draws an episode of ``cfg.policy`` in one test arena, as a GIF and its frames as PNG."""
     folder = run_folder(cfg)
     build.prepare(cfg)
-    settings = cfg.render
+    settings, cfg = cfg.render, build.as_trained(cfg, asked_for())
+    say_world(cfg)
     draw_episode(
-        make_players(build.as_trained(cfg, asked_for())),
+        make_players(cfg),
         folder / "episode.gif",
         seed=settings.seed,
         arena=settings.arena,

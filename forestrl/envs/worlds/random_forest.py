@@ -1,41 +1,18 @@
-"""Sources of worlds: where an episode takes place, and where in it the robot starts."""
+"""The paper's forests: so many trunks in an arena of cells (Table III)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Protocol
+from typing import Annotated
 
 import torch
 from torch import Tensor
 
 from forestrl import functional as F
 from forestrl import kernels
+from forestrl.envs.worlds.source import ATTEMPTS, Side, arena_shape
 from forestrl.settings import Range, checked, not_allowed
 
-Side = Annotated[int, Range(3, 1000)]
 Radius = Annotated[float, Range(above=0, high=50)]
-_ATTEMPTS = 8  # forests drawn before giving up on finding one with a free cell
-
-
-class World(Protocol):
-    """A source of worlds of one shape, for :class:`~forestrl.envs.ForestEnv`."""
-
-    shape: tuple[int, int]
-    """Rows and columns of every arena, cells."""
-
-    def sample(
-        self, batch: tuple[int, ...], *, generator: torch.Generator
-    ) -> tuple[Tensor, Tensor]:
-        """Draws arenas with a start each.
-
-        Args:
-            batch: leading dimensions.
-            generator: source of randomness; the results are on its device.
-
-        Returns:
-            occupied cells, bool ``[*batch, H, W]``, and the robot's cells, int64 ``[*batch, 2]``,
-            each free.
-        """
 
 
 class RandomForest:
@@ -74,13 +51,13 @@ class RandomForest:
     def sample(
         self, batch: tuple[int, ...], *, generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
-        """Draws forests and starts, see :class:`World`.
+        """Draws forests and starts, see :class:`~forestrl.envs.World`.
 
         Raises:
             ValueError: if no forest with a free cell turns up.
         """
         trees = self._draw(batch, generator)
-        for _ in range(_ATTEMPTS):
+        for _ in range(ATTEMPTS):
             full = trees.flatten(-2).all(-1)
             if not full.any():
                 return trees, F.sample_position(kernels.largest_component(~trees), generator)
@@ -99,10 +76,3 @@ class RandomForest:
             tree_radius=self.tree_radius,
             generator=generator,
         )
-
-
-@checked
-def arena_shape(shape: Side | tuple[Side, Side]) -> tuple[int, int]:
-    """Gives rows and columns from either, or from the side of a square."""
-    rows, columns = shape if isinstance(shape, Sequence) else (shape, shape)
-    return rows, columns
