@@ -18,7 +18,7 @@ RUN = "<!-- run -->"
 """The first line of a page that is run from top to bottom, in a folder of its own."""
 _BLOCK = re.compile(r"^```(python|yaml|bash)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _FILE = re.compile(r"# ([\w/.]+\.(?:py|yaml))\n")
-_NOT_RUN = re.compile(r"#.*(minutes|composed only)")
+_NOT_RUN = re.compile(r"#.*(minutes|writes to ~)")
 
 
 class Block(NamedTuple):
