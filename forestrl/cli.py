@@ -15,6 +15,7 @@ COMMANDS = {
     "bench": "measure frames per second on this machine",
     "collisions": "count collisions with and without the filter",
     "export": "write a world as map files",
+    "dashboard": "save a workspace for your runs on Weights & Biases",
 }
 
 

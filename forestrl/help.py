@@ -104,15 +104,18 @@ def _comments(paths: Iterable[Path]) -> dict[str, str]:
     return found
 
 
+def about(path: Path) -> str:
+    """Gives the words at the head of a YAML file, which say what it is."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return " ".join(line[2:] for line in lines if line.startswith("# ") and "@" not in line)
+
+
 def _options(group: str, chosen: str | None, sources: list[Path]) -> str:
     """Writes a group with its options, and what the chosen one is."""
     paths = {path.stem: path for source in sources for path in source.glob(f"{group}/*.yaml")}
     others = ", ".join(sorted(paths.keys() - {chosen}))
-    head = []
-    if chosen in paths:
-        text = paths[chosen].read_text(encoding="utf-8")
-        head = [line[2:] for line in text.splitlines() if line.startswith("# ") and "@" not in line]
-    words = " ".join([*head, f"Others: {others}." if others else ""])
+    head = about(paths[chosen]) if chosen in paths else ""
+    words = f"{head} {f'Others: {others}.' if others else ''}"
     return _wrapped(f"{group}={written(chosen)}".ljust(_COLUMN) + " " + words, _COLUMN + 1)
 
 

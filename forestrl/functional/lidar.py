@@ -31,7 +31,7 @@ def sight_lines(lidar_range: float) -> SightLines:
     """Lists what a sensor of the given range can see, and through which cells.
 
     The line to offset (dr, dc) passes the cells at (round(i dr / n), round(i dc / n)) for
-    i = 1 .. n-1 with n = max(|dr|, |dc|), halves rounded away from zero.
+    i = 1 .. n-1 with ``n = max(|dr|, |dc|)``, halves rounded away from zero.
 
     Args:
         lidar_range: ``l``, cells; a cell is within range if its offset is not longer.

@@ -29,8 +29,8 @@ class GATv2Encoder(nn.Module):
 
     .. math::
         e_{ij} &= a^\top \mathrm{LeakyReLU}(W_l x_j + W_r x_i + w_e d_{ij}) & \text{(Eq. 3)} \\
-        \alpha_{ij} &= \exp(e_{ij}) / \textstyle\sum_k \exp(e_{ik}) & \text{(Eq. 4)} \\
-        x'_i &= \textstyle\sum_j \alpha_{ij} W_l x_j + b & \text{(Eq. 5)}
+        \alpha_{ij} &= \exp(e_{ij}) / \sum_k \exp(e_{ik}) & \text{(Eq. 4)} \\
+        x'_i &= \sum_j \alpha_{ij} W_l x_j + b & \text{(Eq. 5)}
 
     with ``d_ij`` the edge's length in units of ``l``. The outputs of nodes 0 to 8, the agent and
     its waypoints, are the actor's logits for actions 0 to 8.
