@@ -14,6 +14,7 @@ COMMANDS = {
     "figures": "draw the figures from their result files",
     "bench": "measure frames per second on this machine",
     "collisions": "count collisions with and without the filter",
+    "plan": "tell a robot where to go, by lines of JSON",
 }
 
 

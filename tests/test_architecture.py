@@ -16,7 +16,7 @@ L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "benchmark", "sweeps", "tables"}
 L3 = {"config", "command", "loggers", "build", "runs"}
 LIGHT = {"config", "command", "settings", "shared"}
-L4 = {"train", "eval", "render", "collisions", "bench", "figures"}
+L4 = {"train", "eval", "render", "collisions", "bench", "figures", "plan"}
 ROOMS = {  # room: the other rooms it may import from
     "": set(),
     "functional": set(),
