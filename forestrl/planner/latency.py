@@ -50,7 +50,8 @@ def measured() -> Iterator[tuple[str, int, int, float, float]]:
     for policy in POLICIES:
         for side, decisions in SIDES.items():
             times = list(walk(policy, side, decisions))
-            yield policy, side, len(times), *map(float, np.percentile(times, (50, 99)))
+            median, slow = (float(value) for value in np.percentile(times, (50, 99)))
+            yield policy, side, len(times), median, slow
 
 
 def main() -> None:

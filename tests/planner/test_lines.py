@@ -78,7 +78,7 @@ BAD = [
     ("[1]", "no JSON object"),
     ('{"type": "fly"}', "type='fly' is not allowed: it must be one of plan, reject"),
     ('{"schema": 2}', "schema=2 is not allowed"),
-    ('{"positon": [0, 0]}', "positon is no field of a plan request"),
+    ('{"posture": [0, 0]}', "posture is no field of a plan request"),
     ('{"type": "restore", "state": 3}', "the state of policy=None"),
     ('{"type": "reject", "goal": [0]}', "goal has 1 numbers"),
     ('{"grid": {"data": "*"}}', "data is no base64"),
