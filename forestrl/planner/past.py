@@ -98,7 +98,7 @@ class Past:
 
     @staticmethod
     def from_text(text: Mapping[str, Any], make: MakePolicy, wait: float, now: float) -> Past:
-        """Takes up what :meth:`as_text` gave.
+        """Takes up what :meth:`Past.as_text` gave.
 
         Args:
             text: what it gave.

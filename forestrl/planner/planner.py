@@ -17,7 +17,7 @@ from forestrl.planner.decision import Decision, PlannerStatus, Point
 from forestrl.planner.grid import BadInputError, finite, numbers_of
 from forestrl.planner.memory import carried_over, keep_views
 from forestrl.planner.past import Past
-from forestrl.planner.policies import MakePolicy, policy_named
+from forestrl.planner.policies import policy_named
 from forestrl.planner.rules import Edge, Rules, corners
 from forestrl.planner.situation import Situation, situation
 from forestrl.planners.viewpoints.path_gain import GRID
@@ -59,7 +59,7 @@ class Planner:
         deterministic: take the most probable action instead of a sampled one; None for what the
             policy is meant for.
         seed: of a policy that samples.
-        clock: gives the time where :meth:`plan` is not given one, seconds.
+        clock: gives the time where :meth:`Planner.plan` is not given one, seconds.
 
     Raises:
         CheckpointError: if the policy's file is missing or none.
@@ -76,7 +76,7 @@ class Planner:
     @checked
     def __init__(
         self,
-        policy: str | MakePolicy = "learned",
+        policy: str | Callable[[float], Any] = "learned",
         *,
         lidar_range: Metres = 5.0,
         robot_radius: Annotated[float, Range(0, 100)] = 0.0,
@@ -201,7 +201,7 @@ class Planner:
             return {"policy": self._name, **self._past.as_text(self._clock())}
 
     def restore(self, state: Any) -> None:
-        """Goes on from what :meth:`state` gave, in a planner with the same settings.
+        """Goes on from what :meth:`Planner.state` gave, in a planner with the same settings.
 
         Raises:
             ValueError: if it is of another policy, or none.

@@ -55,7 +55,7 @@ class SetAside:
         return [[*goal, until - now, self._waits[goal]] for goal, until in self._until.items()]
 
     def restore(self, state: list[Any], now: float) -> None:
-        """Takes up what :meth:`state` gave."""
+        """Takes up what :meth:`SetAside.state` gave."""
         self._until, self._waits = {}, {}
         for x, y, left, wait in state:
             self._until[x, y], self._waits[x, y] = now + left, wait
