@@ -16,6 +16,7 @@ COMMANDS = {
     "collisions": "count collisions with and without the filter",
     "export": "write a world as map files",
     "dashboard": "save a workspace for your runs on Weights & Biases",
+    "plan": "tell a robot where to go, by lines of JSON",
 }
 
 

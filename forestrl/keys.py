@@ -24,6 +24,7 @@ columns of the arena (the paper's ``h``), ``M`` is the room for frontier nodes.
 | ``"action"`` | u^pi at the root | ``[*B]`` int64, 0 to 8 | policy |
 | ``("planner", "status")`` | - | ``[*B]`` int8, ``Status`` | classical planners |
 | ``("planner", "guarded")`` | - | ``[*B]`` bool, the guard against cycles chose | explorer |
+| ``("planner", "target")`` | - | ``[*B, 2]`` int64, (row, col); -1: none | planners with a goal |
 | ``"uniform"`` | - | ``[*B]`` float32, one draw an arena to sample with | evaluation |
 
 ``"reward"`` is n^e_t from ForestEnv and r_t (Eq. 6) after FrontierPotentialReward; ``"done"``,
@@ -58,3 +59,4 @@ LOGITS = "logits"
 UNIFORM = "uniform"
 STATUS = ("planner", "status")
 GUARDED = ("planner", "guarded")
+TARGET = ("planner", "target")

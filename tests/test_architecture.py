@@ -16,7 +16,7 @@ L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "benchmark", "sweeps", "tables"}
 L3 = {"config", "command", "loggers", "build", "runs"}
 LIGHT = {"config", "command", "settings", "shared"}
-L4 = {"train", "eval", "render", "collisions", "bench", "figures", "export", "dashboard"}
+L4 = {"train", "eval", "render", "collisions", "bench", "figures", "export", "dashboard", "plan"}
 ROOMS = {  # room: the other rooms it may import from
     "": set(),
     "functional": set(),
@@ -29,7 +29,7 @@ ROOMS = {  # room: the other rooms it may import from
     **dict.fromkeys(L2, L0 | L1),
     "explorer": L0 | L1 | {"planners"},
     "released": {"explorer", "policies"},
-    "planner": L0 | L1 | L2 | {"released"},
+    "planner": L0 | L1 | L2 | {"", "explorer", "released"},
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
     "benchmark": L0 | L1 | L2 | {"explorer", "planner"},

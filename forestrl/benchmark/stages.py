@@ -15,7 +15,7 @@ The pipeline of a training, by the time of a collected frame:
 Beside it stand the **evaluation step**, which is policy, env step and the passage to the next
 state, without the record kept of it; and the **decision** of one robot, from an observation to an
 action without gradient or TensorDict; **+ filter** with the feasible actions and Algorithm 1;
-**from the map**, all that :class:`forestrl.planner.Planner` does.
+**from the map**, all that :class:`forestrl.planner.CellPlanner` does.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from forestrl.benchmark.states import enter
 from forestrl.learning.collector import ArenaCollector
 from forestrl.learning.metrics import summarize
 from forestrl.learning.ppo import PPO
-from forestrl.planner import Planner
+from forestrl.planner import CellPlanner
 from forestrl.policies.actor_critic import ActorCritic
 
 
@@ -61,7 +61,7 @@ class Setup:
     networks: ActorCritic
     ppo: PPO
     make_collector: Callable[[], ArenaCollector] | None
-    planner: Planner | None
+    planner: CellPlanner | None
 
     def envs(self) -> dict[str, EnvBase]:
         """Returns envs by stage, each with one transform more; "+ graph" is that of evaluation."""

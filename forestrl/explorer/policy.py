@@ -61,7 +61,8 @@ class ViewpointPolicy(ClassicalPlanner):
             reason = "a policy that compares viewpoints is always deterministic"
             raise not_allowed("deterministic", deterministic, reason)
         super().__init__(
-            remembers=[GRID, SEEN, COUNTS, HEADING, GOAL, IDLE, K.GUARDED], can_cycle=False
+            remembers=[GRID, SEEN, COUNTS, HEADING, GOAL, IDLE, K.GUARDED, K.TARGET],
+            can_cycle=False,
         )
         self.weights, self.lidar_range, self.coverage_goal = weights, lidar_range, coverage_goal
         self.file: Any = None
@@ -81,6 +82,7 @@ class ViewpointPolicy(ClassicalPlanner):
             entries[key] = entries[key].contiguous()
         memory = [entries[key].numpy() for key in (HEADING, GOAL, IDLE)]
         guarded = entries[K.GUARDED] = torch.zeros(n, dtype=torch.bool)
+        entries[K.TARGET] = torch.full((n, 2), -1)
         action = torch.zeros(n, dtype=torch.int64)
         status = torch.zeros(n, dtype=torch.int8)
         _plan(
@@ -94,6 +96,7 @@ class ViewpointPolicy(ClassicalPlanner):
             action.numpy(),
             status.numpy(),
             guarded.numpy(),
+            entries[K.TARGET].numpy(),
         )
         return action, status
 
@@ -116,6 +119,7 @@ def _plan(
     action: np.ndarray,
     status: np.ndarray,
     guarded: np.ndarray,
+    goals: np.ndarray,
 ) -> None:
     stride = cells.shape[2] + 2 * lines.margin
     for b in range(begin, end):
@@ -129,3 +133,4 @@ def _plan(
             target = first_step(paths, to)
             action[b], status[b] = action_to(lines, source, target), EXPLORING
             remember(memory, stride, source, target, to)
+            goals[b, 0], goals[b, 1] = to // stride - lines.margin, to % stride - lines.margin

@@ -24,7 +24,7 @@ from forestrl.benchmark.scaling import growth
 from forestrl.benchmark.stages import Setup
 from forestrl.benchmark.states import explore
 from forestrl.command import asked_for, run_folder
-from forestrl.planner import Planner
+from forestrl.planner import CellPlanner
 from forestrl.storage import atomic_write
 
 _POOL = 64  # arenas explored of each size; larger batches repeat them
@@ -69,7 +69,7 @@ def make_setup(cfg: DictConfig) -> Setup:
         networks=networks,
         ppo=ppo,
         make_collector=partial(build.make_collector, cfg, env, ppo.actor) if divides else None,
-        planner=Planner(networks.make_policy(), observe) if outside else None,
+        planner=CellPlanner(networks.make_policy(), observe) if outside else None,
     )
 
 

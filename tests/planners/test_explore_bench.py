@@ -72,7 +72,7 @@ def status(td):
 @each(seed=SEEDS)
 def test_information_gain_equals_its_loop(explored, window, power, seed):
     _, cells, position = state(seed, explored)
-    action, _ = information_gain(cells, position, window=window, power=power)
+    action, _, _ = information_gain(cells, position, window=window, power=power)
     here = tuple(position.tolist())
     goal = oracles.gain_goal(cells.tolist(), here, window=window, power=power)
     assert action == oracles.towards(cells.tolist(), here, goal), draw(cells, position)

@@ -39,7 +39,9 @@ class _ExploreBench(ClassicalPlanner):
     @checked
     def __init__(self, variant: Variant) -> None:
         as_published = variant == "published"
-        super().__init__(reads=[K.TREES] * as_published, remembers=[_GOAL] * (not as_published))
+        super().__init__(
+            reads=[K.TREES] * as_published, remembers=[_GOAL, K.TARGET] * (not as_published)
+        )
         self.variant = variant
 
     def plan(self, entries: dict[Key, Tensor], changed: Tensor) -> tuple[Tensor, Tensor]:
@@ -49,6 +51,7 @@ class _ExploreBench(ClassicalPlanner):
             return self._published(cells, position, entries[K.TREES])
         kept = torch.where(changed.unsqueeze(-1), -1, entries.get(_GOAL, position))
         action, status, entries[_GOAL] = self._corrected(cells, position, kept)
+        entries[K.TARGET] = entries[_GOAL]
         return action, status
 
 

@@ -6,11 +6,12 @@ from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from forestrl import keys as K
 from forestrl.functional import Cell
-from forestrl.kernels.batches import over_batch
+from forestrl.kernels.batches import over_batch, rows
 from forestrl.kernels.compiling import compiled
 from forestrl.kernels.flood import PAD, eight_steps, pad, walk
 from forestrl.planners.base import ClassicalPlanner, Key
@@ -43,6 +44,7 @@ def _information_gain(
     cost: np.ndarray,
     action: np.ndarray,
     status: np.ndarray,
+    target: np.ndarray,
 ) -> None:
     width = cells.shape[2]
     stride = width + 2 * PAD
@@ -66,6 +68,7 @@ def _information_gain(
             action[b], status[b] = 0, status_at_end(grid, steps, stride)
         else:
             action[b], status[b] = first_action(lengths, steps, source, best, queue), EXPLORING
+            target[b, 0], target[b, 1] = best // stride - PAD, best % stride - PAD
 
 
 @lru_cache(maxsize=4)
@@ -75,7 +78,7 @@ def _powers(count: int, power: float) -> np.ndarray:
 
 def information_gain(
     cells: Tensor, position: Tensor, *, window: int, power: float
-) -> tuple[Tensor, Tensor]:
+) -> tuple[Tensor, Tensor, Tensor]:
     """Takes a step towards the frontier cell with the most gain per path length.
 
     The gain is the number of unknown cells in the window around the frontier cell; it is divided by
@@ -89,12 +92,15 @@ def information_gain(
         power: exponent of the path length, 0 or more.
 
     Returns:
-        action, int64 ``[*B]``, and :class:`~forestrl.status.Status`, int8 ``[*B]``.
+        action, int64 ``[*B]``, :class:`~forestrl.status.Status`, int8 ``[*B]``, and the frontier
+        cell, int64 ``[*B, 2]``, -1 where there is none.
     """
     maps, places, action, status = arguments(cells, position)
+    target = torch.full_like(position, -1)
     cost = _powers(maps.shape[-2] * maps.shape[-1] + 1, float(power))
-    _information_gain(maps, places, window // 2, cost, action.numpy(), status.numpy())
-    return action.view(cells.shape[:-2]), status.view(cells.shape[:-2])
+    results = action.numpy(), status.numpy(), rows(target)
+    _information_gain(maps, places, window // 2, cost, *results)
+    return action.view(cells.shape[:-2]), status.view(cells.shape[:-2]), target
 
 
 class InformationGain(ClassicalPlanner):
@@ -118,11 +124,12 @@ class InformationGain(ClassicalPlanner):
         window: Annotated[int, Range(3, 101, odd=True)] = 7,
         power: Annotated[float, Range(0, 10)] = 1.0,
     ) -> None:
-        super().__init__()
+        super().__init__(remembers=[K.TARGET])
         self.window, self.power = window, power
 
     def plan(self, entries: dict[Key, Tensor], changed: Tensor) -> tuple[Tensor, Tensor]:
         """Plans one step."""
-        return information_gain(
+        action, status, entries[K.TARGET] = information_gain(
             entries[K.CELLS], entries[K.POSITION], window=self.window, power=self.power
         )
+        return action, status

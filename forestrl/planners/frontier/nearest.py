@@ -20,6 +20,9 @@ class NearestFrontier(ClassicalPlanner):
     no frontier in reach the agent stays.
     """
 
+    def __init__(self) -> None:
+        super().__init__(remembers=[K.TARGET])
+
     def plan(self, entries: dict[Key, Tensor], changed: Tensor) -> tuple[Tensor, Tensor]:
         """Plans one step."""
         cells, position = entries[K.CELLS], entries[K.POSITION]
@@ -28,6 +31,7 @@ class NearestFrontier(ClassicalPlanner):
         lengths = lengths.masked_fill(~frontier, torch.inf).flatten(-2)
         nearest, goal = lengths.min(-1)
         goal = torch.stack((goal // cells.shape[-1], goal % cells.shape[-1]), -1)
+        entries[K.TARGET] = goal.where(nearest.isfinite().unsqueeze(-1), -1)
         action = first_move(free, position, goal)
         left = frontier.flatten(-2).any(-1)
         end = torch.where(left, int(Status.NO_REACHABLE_FRONTIER), int(Status.COVERED))

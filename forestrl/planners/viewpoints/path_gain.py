@@ -52,7 +52,7 @@ class PathGain(ClassicalPlanner):
         lidar_range: Annotated[float, Range(1.415, 100)] = 5.0,
         power: Annotated[float, Range(0, 10)] = 1.4,
     ) -> None:
-        super().__init__(remembers=[GRID, SEEN, COUNTS])
+        super().__init__(remembers=[GRID, SEEN, COUNTS, K.TARGET])
         self.lidar_range, self.power = lidar_range, power
 
     def plan(self, entries: dict[Key, Tensor], changed: Tensor) -> tuple[Tensor, Tensor]:
@@ -63,7 +63,9 @@ class PathGain(ClassicalPlanner):
         status = torch.zeros(len(cells), dtype=torch.int8)
         remembered = remembered_views(entries, lines)
         place = rows(entries[K.POSITION])
-        _plan(grids(cells), place, *remembered, lines, self.power, action.numpy(), status.numpy())
+        entries[K.TARGET] = torch.full((len(cells), 2), -1)
+        results = action.numpy(), status.numpy(), entries[K.TARGET].numpy()
+        _plan(grids(cells), place, *remembered, lines, self.power, *results)
         return action, status
 
 
@@ -113,18 +115,20 @@ def _plan(
     power: float,
     action: np.ndarray,
     status: np.ndarray,
+    target: np.ndarray,
 ) -> None:
     for b in range(first, last):
         views = Views(grid[b], seen[b], counts[b])
         source = look(views, lines, cells[b], position[b, 0], position[b, 1])
         paths = paths_from(views, lines, source)
         goal = path_gain(views, paths, power)
+        stride = cells.shape[2] + 2 * lines.margin
         if goal == NOWHERE:
-            stride = cells.shape[2] + 2 * lines.margin
             action[b], status[b] = 0, status_at_end(grid[b], lines.steps, stride)
         else:
             action[b] = action_to(lines, source, first_step(paths, goal))
             status[b] = EXPLORING
+            target[b, 0], target[b, 1] = goal // stride - lines.margin, goal % stride - lines.margin
 
 
 @compiled

@@ -6,20 +6,17 @@ import torch
 from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.envs import ExplorationGraph
-from forestrl.planner import Planner
+from forestrl.planner import CellPlanner
+from forestrl.planner.policies import policy_named
 from forestrl.planners import CostBased, InformationGain, NearestFrontier
 from forestrl.policies.actor_critic import LearnedPolicy
-from forestrl.policies.files import (
-    CheckpointError,
-    Described,
-    load_policy,
-    save_policy,
-)
+from forestrl.policies.files import CheckpointError, Described, load_policy, save_policy
 from forestrl.released import MODELS, RELEASED
 from forestrl.status import Status
 from tests.drawing import situation
 from tests.envs.worlds import make_forest, make_transformed
 
+PAPER = RELEASED["paper"]
 PLANNERS = [NearestFrontier, InformationGain, lambda: CostBased("corrected")]
 
 
@@ -39,20 +36,20 @@ def follow(env, planner, policy, steps):
 
 def test_a_learned_policy_decides_as_in_the_env():
     env = make_transformed(size=15, n_trees=10, lidar_range=3.0)
-    policy = load_policy(RELEASED["paper"]).build(MODELS, lidar_range=3.0)
-    planner = Planner.from_file(RELEASED["paper"], lidar_range=3.0, deterministic=True)
+    policy = load_policy(PAPER).build(MODELS, lidar_range=3.0)
+    planner = CellPlanner(*policy_named("paper", deterministic=True)(3.0))
     env.transform[1].max_frontiers = planner.observe.max_frontiers
     done = list(follow(env, planner, policy.make_policy(deterministic=True), 25))
     assert len({decision.action for decision, _ in done}) > 2
     for decision, _ in done:
         assert sum(decision.probabilities) == pytest.approx(1, abs=1e-5)
-        assert decision.status == Status.EXPLORING
+        assert decision.status is None and decision.goal is None
 
 
 @pytest.mark.parametrize("make", PLANNERS)
 def test_a_classical_planner_decides_as_in_the_env_and_remembers(make):
     env = make_forest(size=15, n_trees=10, lidar_range=3.0, max_steps=10**6)
-    planner = Planner(make())
+    planner = CellPlanner(make())
     done = list(follow(env, planner, make(), 150))
     assert done[-1][0].status == Status.COVERED and done[0][0].status == Status.EXPLORING
     assert all(decision.probabilities is None for decision, _ in done)
@@ -68,7 +65,7 @@ def _start():
 def test_the_filter_guards_every_answer():
     cells, position = situation("T T T\nT A .\nT T T")
     always_north = LearnedPolicy(_North(), deterministic=True)
-    decision = Planner(always_north).decide(cells, position.tolist())
+    decision = CellPlanner(always_north).decide(cells, position.tolist())
     assert (decision.proposed, decision.action, decision.intervened) == (2, 5, True)
 
 
@@ -85,22 +82,22 @@ class _North(torch.nn.Module):
 def test_a_cell_outside_the_map_is_refused(position):
     cells, _ = situation(". . .\n. A .\n. . .")
     with pytest.raises(ValueError, match=r"is not a cell of \[3, 3\]"):
-        Planner(NearestFrontier()).decide(cells, position)
+        CellPlanner(NearestFrontier()).decide(cells, position)
 
 
 def test_an_observation_that_is_not_known_is_refused(tmp_path):
-    policy = load_policy(RELEASED["paper"])
+    policy = load_policy(PAPER)
     settings = vars(policy) | {"observation": Described("mine.Observation", {})}
     save_policy(tmp_path / "x", type(policy)(**settings))
     with pytest.raises(CheckpointError, match=r"reads 'mine.Observation', which is not one of"):
-        Planner.from_file(tmp_path / "x")
+        policy_named(str(tmp_path / "x"))
 
 
 def test_the_parts_that_a_planner_is_made_of_are_those_of_the_env():
     """An own observation and a policy of one's own, without any file."""
     observe = ExplorationGraph(lidar_range=5.0)
-    policy = load_policy(RELEASED["paper"]).build(MODELS).make_policy(True)
+    policy = load_policy(PAPER).build(MODELS).make_policy(True)
     cells, position = situation(". . ?\n. A ?\n. . .")
-    decision = Planner(policy, observe).decide(cells, position.tolist())
+    decision = CellPlanner(policy, observe).decide(cells, position.tolist())
     graph = F.exploration_graph(cells, position, window=7, max_frontiers=256, lidar_range=5.0)
     assert decision.proposed == policy.actor(*graph).argmax().item()
