@@ -23,6 +23,7 @@ columns of the arena (the paper's ``h``), ``M`` is the room for frontier nodes.
 | ``("exploration", "potential")`` | Phi(s_t) | ``[*B, 1]`` float32 | FrontierPotentialReward |
 | ``"action"`` | u^pi at the root | ``[*B]`` int64, 0 to 8 | policy |
 | ``("planner", "status")`` | - | ``[*B]`` int8, ``Status`` | classical planners |
+| ``("planner", "guarded")`` | - | ``[*B]`` bool, the guard against cycles chose | explorer |
 | ``"uniform"`` | - | ``[*B]`` float32, one draw an arena to sample with | evaluation |
 
 ``"reward"`` is n^e_t from ForestEnv and r_t (Eq. 6) after FrontierPotentialReward; ``"done"``,
@@ -56,3 +57,4 @@ ACTION = "action"
 LOGITS = "logits"
 UNIFORM = "uniform"
 STATUS = ("planner", "status")
+GUARDED = ("planner", "guarded")

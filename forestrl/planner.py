@@ -13,7 +13,8 @@ from torch import Tensor
 from forestrl import functional as F
 from forestrl import keys as K
 from forestrl.envs import OBSERVATIONS
-from forestrl.policies.files import CheckpointError, learned_policy
+from forestrl.policies.files import CheckpointError
+from forestrl.released import learned_policy
 from forestrl.status import Status
 
 
@@ -67,7 +68,7 @@ class Planner:
         checkpoint: str | Path | None = None,
         *,
         lidar_range: float = 5.0,
-        deterministic: bool = False,
+        deterministic: bool = True,
     ) -> Planner:
         """Makes a planner of a policy file.
 
@@ -81,6 +82,8 @@ class Planner:
         """
         policy = learned_policy(checkpoint, deterministic, settings={"lidar_range": lidar_range})
         observation = policy.file.observation
+        if observation is None:
+            return cls(policy)
         if observation.name not in OBSERVATIONS:
             known = ", ".join(OBSERVATIONS)
             raise CheckpointError(

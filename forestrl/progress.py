@@ -13,25 +13,27 @@ _SHOWN = {
     "rollout/return": "return",
     "rollout/coverage": "coverage",
     "safety/intervention_rate": "interventions",
+    "eval/steps": "steps",
 }
 _CUT_SHORT = "{} in training episodes, cut short at first; eval.every=0 measures no other"
 _SECONDS_BETWEEN_LINES = 10
 
 
 class Progress:
-    """Shows how far a training is, counted in frames, with an estimate of the time left.
+    """Shows how far a training is, with an estimate of the time left.
 
     Args:
         total: frames in all.
         start: frames done before.
+        unit: what is counted, if not frames.
     """
 
-    def __init__(self, total: int, start: int = 0) -> None:
-        self.total, self.done = total, start
+    def __init__(self, total: int, start: int = 0, unit: str = "frame") -> None:
+        self.total, self.done, self.unit = total, start, unit
         self.bar = tqdm(
             total=total,
             initial=start,
-            unit="frame",
+            unit=unit,
             unit_scale=True,
             smoothing=0.05,
             disable=not sys.stderr.isatty(),
@@ -53,9 +55,10 @@ class Progress:
         self.bar.close()
 
     def update(self, frames: int, metrics: dict[str, float]) -> None:
-        """Shows that ``frames`` are done; a metric that is nan keeps its last value."""
+        """Shows that ``frames`` are done; a metric that is missing or nan keeps its last value."""
         now = time.monotonic()
-        self.shown |= {n: metrics[key] for key, n in _SHOWN.items() if metrics[key] == metrics[key]}
+        known = {n: metrics[key] for key, n in _SHOWN.items() if key in metrics}
+        self.shown |= {name: value for name, value in known.items() if value == value}
         self.bar.set_postfix({name: f"{value:.3g}" for name, value in self.shown.items()}, False)
         self.bar.update(frames - self.done)
         self.paces.append((now - self.last_update) / max(frames - self.done, 1))
@@ -71,9 +74,13 @@ class Progress:
         left = (self.total - self.done) * pace
         shown = "  ".join(f"{name} {value:.3g}" for name, value in self.shown.items())
         return (
-            f"{self.done:>9,} of {self.total:,} frames  {1 / max(pace, 1e-9):,.0f} frames/s  "
+            f"{self.done:>9,} of {self.total:,} {self.unit}s  {self._pace(pace)}  "
             f"{_clock(left)} left  {shown}"
         )
+
+    def _pace(self, seconds: float) -> str:
+        rate = 1 / max(seconds, 1e-9)
+        return f"{rate:,.0f} {self.unit}s/s" if rate >= 1 else f"{seconds:,.0f} s/{self.unit}"
 
     def summary(self, metrics: dict[str, float]) -> str:
         """Sums the training up in a short table."""

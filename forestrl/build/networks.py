@@ -7,6 +7,7 @@ from typing import Any
 import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
+from torch import nn
 from torchrl.envs import TransformedEnv
 
 from forestrl import functional as F
@@ -15,7 +16,8 @@ from forestrl.build.names import name_of, settings_of
 from forestrl.envs import OBSERVATIONS, WORLDS
 from forestrl.learning.ppo import PPO
 from forestrl.policies.actor_critic import ActorCritic, keys_of
-from forestrl.policies.files import MODELS, Described, Policy, policy_bytes
+from forestrl.policies.files import Described, Policy, policy_bytes
+from forestrl.released import MODELS
 
 NOT_OF_THE_TASK = frozenset({"_target_", "world", "num_envs", "seed", "device"})
 """Entries of the env's node that say nothing of what is to be solved."""
@@ -69,13 +71,24 @@ def check_model(cfg: DictConfig, networks: ActorCritic, env: TransformedEnv) -> 
         raise ConfigError(f"the model cannot be saved: {error}") from error
 
 
-def to_policy(cfg: DictConfig, networks: ActorCritic, training: dict[str, Any]) -> Policy:
-    """Gives networks the description that their policy file needs."""
+def to_policy(
+    cfg: DictConfig, networks: nn.Module, training: dict[str, Any], reads_graph: bool = True
+) -> Policy:
+    """Gives networks the description that their policy file needs.
+
+    Args:
+        cfg: the whole configuration.
+        networks: to be described.
+        training: how they were trained.
+        reads_graph: whether they read the configuration's observation; else the map alone.
+    """
     task: Any = OmegaConf.to_container(cfg.env, resolve=True)
     world = OmegaConf.create(task["world"])
     return Policy(
         Described(name_of(cfg.model, MODELS), settings_of(cfg.model, learnt=True)),
-        Described(name_of(cfg.graph, OBSERVATIONS), settings_of(cfg.graph, learnt=True)),
+        Described(name_of(cfg.graph, OBSERVATIONS), settings_of(cfg.graph, learnt=True))
+        if reads_graph
+        else None,
         {
             **training,
             "env": {name: value for name, value in task.items() if name not in NOT_OF_THE_TASK},

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-from pathlib import Path
 from typing import Any
 
 from hydra.utils import get_class, get_object, instantiate
@@ -13,14 +12,8 @@ from omegaconf import DictConfig, OmegaConf
 from forestrl.build.names import name_of
 from forestrl.build.networks import NOT_OF_THE_TASK
 from forestrl.envs import WORLDS
-from forestrl.policies.files import (
-    MODELS,
-    RELEASED,
-    CheckpointError,
-    find_policy,
-    load_policy,
-    require_same,
-)
+from forestrl.policies.files import CheckpointError, load_policy, require_same
+from forestrl.released import MODELS, policy_file
 
 
 def make_policy(cfg: DictConfig, asked: set[str]) -> tuple[Any, dict[str, Any]]:
@@ -38,18 +31,28 @@ def make_policy(cfg: DictConfig, asked: set[str]) -> tuple[Any, dict[str, Any]]:
     if "models" not in inspect.signature(get_object(node["_target_"])).parameters:
         return instantiate(node), {"policy": cfg.policy.name, "options": options}
     model = get_class(cfg.model["_target_"])
-    free = {name: cfg.model[name] for name in getattr(model, "adjustable", ()) if name in cfg.model}
     models = {**MODELS, name_of(cfg.model, MODELS): model}
+    path = policy_file(cfg.policy.checkpoint, cfg.policy.released)
+    free = adjusted(cfg, models.get(load_policy(path).model.name))
     policy = instantiate(node, models=models, settings=free).to(cfg.device)
     names = (name for name in asked if name.startswith(("model.", "graph.")))
     require_same(policy.file, {name: OmegaConf.select(cfg, name) for name in names})
-    path = find_policy(Path(cfg.policy.checkpoint or RELEASED))
     return policy, {
         "policy": cfg.policy.name,
         "checkpoint": cfg.policy.checkpoint or "released",
         "training": policy.file.training,
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-        "actions": "mode" if cfg.policy.deterministic else "sampled",
+        "actions": "mode" if policy.deterministic else "sampled",
+    }
+
+
+def adjusted(cfg: DictConfig, model: Any) -> dict[str, Any]:
+    """Gives the settings that a model takes from here and not from its file."""
+    nodes = (cfg.model, cfg.env)
+    return {
+        name: next(node[name] for node in nodes if name in node)
+        for name in getattr(model, "adjustable", ())
+        if any(name in node for node in nodes)
     }
 
 

@@ -48,6 +48,8 @@ class Episodes:
     """Steps in which the executed action was to stay, ``[n]``."""
     truncated_graphs: NDArray[np.int32]
     """Observations with more frontier cells than the graph has room for, ``[n]``."""
+    guarded: NDArray[np.int32]
+    """Steps that the explorer's guard against cycles chose, ``[n]``."""
     ending: NDArray[np.int8]
     """Why the episode ended, an ``Ending``, ``[n]``."""
 
@@ -200,7 +202,10 @@ class _Record:
         self.counts = TensorDict(
             {
                 name: torch.zeros(n, dtype=torch.int32, device=device)
-                for name in ("collisions", "straight", "diagonal", "null_actions", "truncated")
+                for name in (
+                    *("collisions", "straight", "diagonal"),
+                    *("null_actions", "truncated", "guarded"),
+                )
             }
         )
 
@@ -216,6 +221,8 @@ class _Record:
         counts["straight"] += moved == 1
         counts["diagonal"] += moved == 2
         counts["null_actions"] += (td[K.ACTION] if executed is None else executed) == F.NULL_ACTION
+        if (guarded := td.get(K.GUARDED, None)) is not None:
+            counts["guarded"] += guarded
         if (frontiers := td.get(K.FRONTIERS, None)) is not None:
             counts["truncated"] += frontiers.squeeze(-1) > td[K.WAYPOINT].shape[-1]
 
@@ -235,6 +242,7 @@ class _Record:
             free_share=_array(known / free.sum((-2, -1))),
             null_actions=_array(self.counts["null_actions"]),
             truncated_graphs=_array(self.counts["truncated"]),
+            guarded=_array(self.counts["guarded"]),
             ending=_array(ending(status, (self.coverage >= goal).any(0))),
         )
 

@@ -113,6 +113,7 @@ def _measures(episodes: Episodes) -> Iterator[tuple[str, Interval, int]]:
         yield name, Interval(float(value)), arenas
     yield over("null_actions", episodes.null_actions)
     yield over("path_length", episodes.path_length)
+    yield "guarded", Interval(float(episodes.guarded.sum())), arenas
     yield "truncated_graphs", Interval(float(episodes.truncated_graphs.sum())), arenas
     for ending in np.unique(episodes.ending):
         share = float((episodes.ending == ending).mean())
@@ -131,6 +132,7 @@ def _episode_rows(episodes: Episodes) -> Iterable[Sequence[Any]]:
         "intervention_rate": episodes.intervention_rate(),
         "null_actions": episodes.null_actions,
         "collisions": episodes.collisions,
+        "guarded": episodes.guarded,
         "path_length": episodes.path_length,
         "ending": [Ending(ending).name.lower() for ending in episodes.ending],
     }
@@ -152,6 +154,7 @@ _WORDS = {
     "null_actions": ("steps in place, a run", 1, 1, ""),
     "path_length": ("way gone, cells", 1, 1, ""),
     "collisions": ("collisions", 1, 0, ""),
+    "guarded": ("steps of the guard", 1, 0, ""),
     "truncated_graphs": ("observations cut off*", 1, 0, ""),
 }
 _CUT_OFF = "* more frontier cells than graph.max_frontiers: the nearest were kept"
@@ -168,7 +171,7 @@ def table(summary: Mapping[str, Any]) -> str:
     lines = [*([summary["title"]] if "title" in summary else []), size]
     filtered = summary.get("meta", {}).get("filter", True)
     for name, row in rows.items():
-        left_out = name == "truncated_graphs" and not row["mean"]
+        left_out = name in ("guarded", "truncated_graphs") and not row["mean"]
         left_out |= not filtered and name in (
             "intervention_rate",
             "percentile_80",

@@ -29,6 +29,7 @@ class LinearScore(nn.Module):
 
     adjustable = ("lidar_range", "coverage_goal")
     """Settings that the weights do not depend on."""
+    weights: Tensor
 
     @checked
     def __init__(
@@ -45,9 +46,9 @@ class LinearScore(nn.Module):
         """Gives the weights as the compiled code takes them."""
         return pack(self.weights, 1)
 
-    def make_policy(self, deterministic: bool = True) -> ViewpointPolicy:
-        """Makes the policy; it is always deterministic."""
-        return ViewpointPolicy(self.pack(), self.lidar_range, self.coverage_goal)
+    def make_policy(self, deterministic: bool | None = None) -> ViewpointPolicy:
+        """Makes the policy; see :class:`ViewpointPolicy`."""
+        return ViewpointPolicy(self.pack(), self.lidar_range, self.coverage_goal, deterministic)
 
 
 class _Layer(nn.Module):
@@ -89,6 +90,9 @@ class ViewpointGATv2(nn.Module):
 
     adjustable = ("lidar_range", "coverage_goal")
     """Settings that the weights do not depend on."""
+    linear: Tensor
+    mean: Tensor
+    scale: Tensor
 
     @checked
     def __init__(
@@ -137,9 +141,9 @@ class ViewpointGATv2(nn.Module):
         """Gives the weights as the compiled code takes them."""
         return pack(self.linear, self.candidates, self)
 
-    def make_policy(self, deterministic: bool = True) -> ViewpointPolicy:
-        """Makes the policy; it is always deterministic."""
-        return ViewpointPolicy(self.pack(), self.lidar_range, self.coverage_goal)
+    def make_policy(self, deterministic: bool | None = None) -> ViewpointPolicy:
+        """Makes the policy; see :class:`ViewpointPolicy`."""
+        return ViewpointPolicy(self.pack(), self.lidar_range, self.coverage_goal, deterministic)
 
 
 def pack(linear: Tensor, most: int, network: ViewpointGATv2 | None = None) -> Weights:
@@ -159,7 +163,7 @@ def pack(linear: Tensor, most: int, network: ViewpointGATv2 | None = None) -> We
     def stacked(values: list[Tensor]) -> Any:
         return array(torch.stack(values))
 
-    layers = list(network.layers)
+    layers: list[Any] = list(network.layers)
     return Weights(
         linear=array(linear),
         most=most,

@@ -29,6 +29,7 @@ from forestrl.planners.viewpoints.paths import first_step, paths_from
 from forestrl.planners.viewpoints.scores import NOWHERE, Memory, no_memory, remember
 from forestrl.planners.viewpoints.sight import Sight, sight
 from forestrl.planners.viewpoints.views import Views
+from forestrl.settings import not_allowed
 
 HEADING, GOAL, IDLE = ("planner", "heading"), ("planner", "goal"), ("planner", "idle")
 """What is remembered besides the views: the parts of ``Memory``."""
@@ -44,10 +45,27 @@ class ViewpointPolicy(ClassicalPlanner):
         weights: what the decision is made of.
         lidar_range: sensor range ``l``, cells; the env's.
         coverage_goal: the coverage to be reached.
+        deterministic: whether it is; there is no other way.
+
+    Raises:
+        ValueError: if it is asked to sample.
     """
 
-    def __init__(self, weights: Weights, lidar_range: float, coverage_goal: float) -> None:
-        super().__init__(remembers=[GRID, SEEN, COUNTS, HEADING, GOAL, IDLE], can_cycle=False)
+    deterministic = True
+
+    def __init__(
+        self,
+        weights: Weights,
+        lidar_range: float,
+        coverage_goal: float,
+        deterministic: bool | None = None,
+    ) -> None:
+        if deterministic is False:
+            reason = "a policy that compares viewpoints is always deterministic"
+            raise not_allowed("deterministic", deterministic, reason)
+        super().__init__(
+            remembers=[GRID, SEEN, COUNTS, HEADING, GOAL, IDLE, K.GUARDED], can_cycle=False
+        )
         self.weights, self.lidar_range, self.coverage_goal = weights, lidar_range, coverage_goal
         self.file: Any = None
         """The policy file it is out of, if it is."""
@@ -65,6 +83,7 @@ class ViewpointPolicy(ClassicalPlanner):
         for key in (HEADING, GOAL, IDLE):
             entries[key] = entries[key].contiguous()
         memory = [entries[key].numpy() for key in (HEADING, GOAL, IDLE)]
+        guarded = entries[K.GUARDED] = torch.zeros(n, dtype=torch.bool)
         action = torch.zeros(n, dtype=torch.int64)
         status = torch.zeros(n, dtype=torch.int8)
         _plan(
@@ -77,6 +96,7 @@ class ViewpointPolicy(ClassicalPlanner):
             self.coverage_goal,
             action.numpy(),
             status.numpy(),
+            guarded.numpy(),
         )
         return action, status
 
@@ -110,13 +130,14 @@ def _plan(
     share: float,
     action: np.ndarray,
     status: np.ndarray,
+    guarded: np.ndarray,
 ) -> None:
     stride = cells.shape[2] + 2 * lines.margin
     for b in range(begin, end):
         views, memory = Views(grid[b], seen[b], counts[b]), Memory(heading[b], goal[b], idle[b])
         source = look(views, lines, cells[b], position[b, 0], position[b, 1])
         paths = paths_from(views, lines, source)
-        to, _ = decide(views, lines, stride, paths, memory, weights, share)
+        to, guarded[b] = decide(views, lines, stride, paths, memory, weights, share)
         if to == NOWHERE:
             action[b], status[b] = 0, status_at_end(grid[b], lines.steps, stride)
         else:

@@ -16,6 +16,7 @@ from forestrl.command import asked_for, run_folder, typed
 from forestrl.evaluation.episodes import evaluate
 from forestrl.evaluation.metrics import eval_metrics
 from forestrl.evaluation.picture import Player, draw_episode
+from forestrl.jobs import search
 from forestrl.learning.checkpoint import (
     load_training,
     restore_training,
@@ -155,6 +156,8 @@ def run(cfg: DictConfig) -> float:
     run_dir, resume = run_folder(cfg), cfg.resume is not None
     if resume:
         cfg = resumed(cfg)
+    if search.is_search(cfg):
+        return search.run(cfg, run_dir)
     build.prepare(cfg)
     training = Training(cfg, run_dir)
     if resume:

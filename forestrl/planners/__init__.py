@@ -6,6 +6,7 @@ from forestrl.planners.frontier.information_gain import InformationGain
 from forestrl.planners.frontier.nearest import NearestFrontier
 from forestrl.planners.hindsight.planner import Hindsight
 from forestrl.planners.random_walk import RandomWalk
+from forestrl.planners.viewpoints.path_gain import PathGain
 
 __all__ = [
     "ClassicalPlanner",
@@ -13,6 +14,7 @@ __all__ = [
     "Hindsight",
     "InformationGain",
     "NearestFrontier",
+    "PathGain",
     "PotentialField",
     "RandomWalk",
 ]

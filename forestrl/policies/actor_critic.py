@@ -92,13 +92,13 @@ class ActorCritic(nn.Module):
         """Binds the critic for PPO: writes ``"state_value"``."""
         return Bound(self.critic, keys_of(self.critic), "state_value")
 
-    def make_policy(self, deterministic: bool = False) -> LearnedPolicy:
+    def make_policy(self, deterministic: bool | None = None) -> LearnedPolicy:
         """Binds the actor for use.
 
         Args:
-            deterministic: take the most probable action instead of a sampled one.
+            deterministic: take the most probable action instead of a sampled one, as None means.
         """
-        return LearnedPolicy(self.actor, deterministic)
+        return LearnedPolicy(self.actor, bool(deterministic))
 
 
 class LearnedPolicy(TensorDictModuleBase):

@@ -18,18 +18,12 @@ from typing import Any
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
-from torch import Tensor
+from torch import Tensor, nn
 
-from forestrl.policies.actor_critic import ActorCritic, LearnedPolicy
-from forestrl.policies.gatv2 import GATv2ActorCritic
 from forestrl.storage import atomic_write
 
 FORMAT = 2
 """Files of format 1 are read too."""
-MODELS: Mapping[str, Callable[..., ActorCritic]] = {"gatv2": GATv2ActorCritic}
-"""The models that a policy file may name."""
-RELEASED = Path(__file__).parent / "assets" / "paper.safetensors"
-"""The released policy, used where no checkpoint is given."""
 POLICY_FILE = "policy.safetensors"
 
 _KEY, _OLD_FORMAT = "forestrl", "forestrl-policy-1"
@@ -54,21 +48,19 @@ class Policy:
 
     Attributes:
         model: the networks.
-        observation: what they read.
+        observation: what they read; None if that is the map alone.
         training: how they were trained: frames, seed, world and what else the writer wrote down.
-        weights: the state dict of the :class:`ActorCritic`.
+        weights: the state dict of the networks.
         source: what to call the policy in a message.
     """
 
     model: Described
-    observation: Described
+    observation: Described | None
     training: dict[str, Any]
     weights: dict[str, Tensor] = field(repr=False)
     source: str = "this policy"
 
-    def build(
-        self, models: Mapping[str, Callable[..., ActorCritic]] = MODELS, **settings: Any
-    ) -> ActorCritic:
+    def build(self, models: Mapping[str, Callable[..., nn.Module]], **settings: Any) -> Any:
         """Builds the networks with these weights, without gradients.
 
         Args:
@@ -103,7 +95,7 @@ def policy_bytes(policy: Policy) -> bytes:
     about = {
         "format": FORMAT,
         "model": vars(policy.model),
-        "observation": vars(policy.observation),
+        "observation": None if policy.observation is None else vars(policy.observation),
         "training": policy.training,
     }
     about["sha256"] = _checksum(about, weights)
@@ -158,8 +150,8 @@ def _described(header: Mapping[str, str], weights: dict[str, Tensor], source: st
         raise CheckpointError(f"{source} has format {about['format']}, this program reads {FORMAT}")
     if about.pop("sha256") != _checksum(about, weights):
         raise CheckpointError(f"{source} is damaged: its checksum is not that of its content")
-    model, observation = (Described(**about[name]) for name in ("model", "observation"))
-    return Policy(model, observation, about["training"], weights, source)
+    reads = about["observation"] and Described(**about["observation"])
+    return Policy(Described(**about["model"]), reads, about["training"], weights, source)
 
 
 def _checksum(about: Mapping[str, Any], weights: Mapping[str, Tensor]) -> str:
@@ -169,33 +161,6 @@ def _checksum(about: Mapping[str, Any], weights: Mapping[str, Tensor]) -> str:
         digest.update(f"{name} {value.dtype} {list(value.shape)}".encode())
         digest.update(value.view(-1).view(torch.uint8).numpy().tobytes())
     return digest.hexdigest()
-
-
-def learned_policy(
-    checkpoint: str | Path | None = None,
-    deterministic: bool = False,
-    *,
-    models: Mapping[str, Callable[..., ActorCritic]] = MODELS,
-    settings: Mapping[str, Any] | None = None,
-) -> LearnedPolicy:
-    """Loads a policy for use.
-
-    Args:
-        checkpoint: a policy file or a run folder; None for the released policy.
-        deterministic: take the most probable action instead of a sampled one.
-        models: the models that may be built, by name.
-        settings: of the model, in place of the file's own.
-
-    Returns:
-        the policy; its ``file`` says what it reads and how it was trained.
-
-    Raises:
-        CheckpointError: if there is no such policy, or it cannot be built.
-    """
-    file = load_policy(RELEASED if checkpoint is None else checkpoint)
-    policy = file.build(models, **(settings or {})).make_policy(deterministic)
-    policy.file = file
-    return policy
 
 
 def find_policy(path: Path) -> Path:
@@ -226,10 +191,11 @@ def require_same(policy: Policy, wanted: Mapping[str, Any]) -> None:
     Raises:
         CheckpointError: naming the first that differs and both values.
     """
-    parts = {"model": policy.model, "graph": policy.observation}
+    parts: dict[str, Described | None] = {"model": policy.model, "graph": policy.observation}
     for name, value in wanted.items():
         part, _, setting = name.partition(".")
-        made_for = parts[part].settings.get(setting, value)
+        described = parts[part]
+        made_for = value if described is None else described.settings.get(setting, value)
         if made_for != value:
             raise CheckpointError(
                 f"{policy.source} was made with {name}={made_for}, but {name}={value} was asked for"

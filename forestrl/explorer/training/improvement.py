@@ -26,7 +26,7 @@ class Fit:
         clip: largest difference in steps that counts, to either side of a state's median.
     """
 
-    epochs: int = 4
+    epochs: int = 8
     batch: int = 512
     lr: float = 1e-3
     weight_decay: float = 1e-4

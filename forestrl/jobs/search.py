@@ -1,0 +1,78 @@
+"""A search to its end: ``forestrl train experiment=linear`` or ``experiment=explorer``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from hydra.utils import get_class, instantiate
+from omegaconf import DictConfig, OmegaConf
+from torch import nn
+
+from forestrl import build
+from forestrl.command import asked_for, typed
+from forestrl.evaluation.arenas import draw_arenas
+from forestrl.explorer.training.task import Arenas, Search, Task
+from forestrl.policies.files import POLICY_FILE, save_policy
+from forestrl.progress import Progress
+
+_OF_PPO = (
+    *("total_frames", "episode_steps", "checkpoint_every", "eval.every", "eval.steps"),
+    *("reward", "graph", "safety", "ablation", "env.num_envs", "env.max_steps"),
+)
+
+
+def is_search(cfg: DictConfig) -> bool:
+    """Tells whether a configuration's ``algo`` plays whole episodes, and is no PPO."""
+    return hasattr(get_class(cfg.algo["_target_"]), "run")
+
+
+def run(cfg: DictConfig, folder: Path) -> float:
+    """Searches to the end; returns the mean steps on the validation arenas, negated, for sweepers.
+
+    Raises:
+        ValueError: if a setting was asked for that only PPO reads.
+    """
+    for name in asked_for():
+        if any(f"{name}.".startswith(f"{each}.") for each in _OF_PPO):
+            raise ValueError(f"{name} is not read by this algo: it is for algo=ppo")
+    build.prepare(cfg)
+    search: Search = instantiate(cfg.algo)
+    network = instantiate(cfg.model)
+    logger, steps, began, failed = build.make_logger(cfg, folder), float("nan"), time.time(), True
+    try:
+        with Progress(search.total, unit=search.unit) as bar:
+            for told in search.run(network, make_task(cfg), folder):
+                if told.metrics:
+                    metrics = told.metrics | {"time/seconds": time.time() - began}
+                    logger.log_metrics(metrics, step=told.done)
+                    steps = metrics.get("eval/steps", steps)
+                bar.update(told.done, told.metrics)
+                if told.network is not None:
+                    save(cfg, told.network, told.done, folder / "checkpoints" / "best", logger)
+        failed = False
+    finally:
+        logger.close(failed)
+    print(f"  steps  {steps:.1f} on the validation arenas, of the last that was measured")
+    print(f"\nnext: forestrl eval {typed('checkpoint', folder)}")
+    return -steps
+
+
+def make_task(cfg: DictConfig) -> Task:
+    """Builds what is to be solved, with the validation arenas."""
+    forest = build.make_forest(cfg, 1)
+    drawn = draw_arenas(forest, cfg.eval.seed, range(cfg.eval.arenas))
+    trees, starts = (drawn[key].numpy() for key in (("arena", "trees"), ("agent", "position")))
+    return Task(
+        forest.world, forest.lidar_range, cfg.env.coverage_goal, cfg.seed, Arenas(trees, starts)
+    )
+
+
+def save(cfg: DictConfig, network: nn.Module, done: int, folder: Path, logger: Any) -> None:
+    """Writes the policy and tells the logger."""
+    folder.mkdir(parents=True, exist_ok=True)
+    algo: Any = OmegaConf.to_container(cfg.algo, resolve=True)
+    about = {"done": done, "seed": cfg.seed, "algo": algo}
+    save_policy(folder / POLICY_FILE, build.to_policy(cfg, network, about, reads_graph=False))
+    logger.log_policy(folder / POLICY_FILE, ["best"])
