@@ -42,7 +42,7 @@ def completed(line, home):
 @pytest.mark.parametrize(
     ("line", "offers"),
     [
-        ("forestrl ", ["train", "eval", "render", "figures", "bench", "collisions"]),
+        ("forestrl ", ["train", "eval", "render", "show", "figures", "bench", "collisions"]),
         ("forestrl re", ["render"]),
         ("forestrl train env.s", ["env.seed=", "env.size="]),
         ("forestrl eval policy=in", ["information_gain"]),

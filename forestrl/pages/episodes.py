@@ -6,13 +6,15 @@ import html
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from forestrl.pages.comparing import falls_behind
 from forestrl.pages.encoding import decode, encode
 from forestrl.pages.page import Page, fill, packed, unpacked
 from forestrl.pages.recording import Recording
 
 STYLES = ("look.css", "episode.css")
-SCRIPTS = ("common.js", "chart.js", "episode.js", "arena.js", "decision.js", "player.js")
+SCRIPTS = ("common.js", "chart.js", "episode.js", "arena.js", "decision.js", "card.js", "player.js")
 DRAWING = SCRIPTS[:4]
 """What draws charts and arenas, without the player."""
 
@@ -49,7 +51,7 @@ def episode_data(
     if not recordings:
         raise ValueError("a page needs a recording")
     first = next(iter(recordings.values()))
-    if any((each.trees != first.trees).any() for each in recordings.values()):
+    if not all(np.array_equal(each.trees, first.trees) for each in recordings.values()):
         raise ValueError("episodes side by side are of the same arena")
     behind = falls_behind([each.coverage for each in recordings.values()], first.coverage_goal)
     return {

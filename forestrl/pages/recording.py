@@ -54,7 +54,7 @@ class Moment(NamedTuple):
     """Of the nine actions; None for a policy without."""
     waypoints: NDArray[np.uint8]
     """Of each frontier cell in row-major order, the waypoint it is tied to (Eq. 2), 1 to 8; 0 for
-    those without a node. Empty without a graph."""
+    those without a node. Empty for a policy that reads no graph."""
     considered: Considered
     """Empty for a policy that compares no viewpoints."""
 
@@ -72,7 +72,7 @@ class Recording:
     has_filter: bool
     """Whether Algorithm 1 watched over the actions."""
     has_graph: bool
-    """Whether the exploration graph was built."""
+    """Whether the policy read the exploration graph."""
     moments: tuple[Moment, ...]
     """One more than there were steps."""
 
@@ -125,7 +125,7 @@ def record(
         lidar_range=scene.lidar_range,
         coverage_goal=scene.coverage_goal,
         has_filter=scene.has_filter,
-        has_graph=scene.has_graph,
+        has_graph=any(len(moment.waypoints) for moment in moments),
         moments=tuple(moments),
     )
 
@@ -149,7 +149,8 @@ def _moment(scene: Scene, before: NDArray[np.uint8], considered: Considered) -> 
     decides = scene.proposed is not None and scene.status == Status.EXPLORING
     action = {target: index for index, target in enumerate(scene.targets)}
     ties = {node: action[waypoint] for node, waypoint in scene.ties}
-    shown = [ties.get(cell, 0) for cell in scene.frontier] if scene.has_graph else []
+    reads = scene.has_graph and scene.probability is not None
+    shown = [ties.get(cell, 0) for cell in scene.frontier] if reads else []
     return Moment(
         changed=changed,
         values=scene.cells.reshape(-1)[changed],
