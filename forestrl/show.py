@@ -1,4 +1,4 @@
-"""Writes a page that plays an episode: ``python -m forestrl.show policy=path_gain show.arena=3``."""
+"""Writes a page that plays an episode: ``python -m forestrl.show policy=path_gain``."""
 
 from __future__ import annotations
 

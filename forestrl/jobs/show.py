@@ -22,9 +22,10 @@ def run(cfg: DictConfig) -> None:
     build.prepare(cfg)
     task = build.as_trained(cfg, asked_for())
     players = make_players(task, cfg.show.beside)
+    names = _together([name.replace("_", " ") for name in players])
     page = episode_page(
         {name: _recorded(player, cfg.show) for name, player in players.items()},
-        title=f"{_together([name.replace('_', ' ') for name in players])} in a forest",
+        title=f"{names} in test arena {cfg.show.arena}",
         about={
             "command": shlex.join(["forestrl", "show", *HydraConfig.get().overrides.task]),
             "test arena": f"{cfg.show.arena}, seed {cfg.show.seed}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -110,5 +111,5 @@ def _run_lengths(flags: NDArray[np.bool_]) -> list[int]:
     [0, 2, 1]
     """
     ends = [0, *(np.flatnonzero(flags[1:] != flags[:-1]) + 1).tolist(), len(flags)]
-    runs = [end - start for start, end in zip(ends, ends[1:], strict=False)]
+    runs = [end - start for start, end in pairwise(ends)]
     return [0, *runs] if flags[0] else runs

@@ -2,13 +2,13 @@
 
 const CAPTIONS = { map: "What the robot knows", forest: "The forest" };
 
-const CURVES = { left: 52, right: 14, top: 10, bottom: 22, inside: true };
+const CURVES = { left: 52, right: 14, top: 8, bottom: 22 };
 
 const words = (name) => name.replaceAll("_", " ");
 
 /** One policy on the page: its arena, its coverage and its decision. */
 class Card {
-  constructor(episode, index) {
+  constructor(episode, index, behind) {
     this.episode = episode;
     this.paint = `policy-${index % DASHES.length}`;
     this.canvases = ["map", "forest"].map((view) => make("canvas", { role: "img", "data-view": view }));
@@ -19,7 +19,7 @@ class Card {
     this.dash = DASHES[index % DASHES.length];
     const name = make("div", { class: "name" }, this.sample, make("h2", {}, words(episode.name)), this.covered);
     const body = make("div", { class: "body" }, make("div", { class: "views" }, ...this.figures), this.decision.element);
-    this.element = make("article", { class: "card", style: `--mine: var(--${this.paint})` }, name, body);
+    this.element = make("article", { class: "card", style: `--mine: var(--${this.paint})` }, name, moments(episode, behind), body);
     this.canvases.forEach((canvas) => { canvas.style.aspectRatio = `${episode.columns} / ${episode.rows}`; });
   }
 
@@ -60,9 +60,16 @@ class Card {
   }
 }
 
+/** Gives links to where a policy falls behind the best of the others for good, and to its end. */
+function moments(episode, behind) {
+  const { steps } = episode, link = (step, text) => make("a", { href: `#step=${step}` }, `${text} ${step}`);
+  const end = link(steps, episode.endsAtGoal() ? "at the goal at step" : "ends at step");
+  return make("p", { class: "small" }, ...(behind === null ? [end] : [link(behind, "behind for good from step"), " · ", end]));
+}
+
 /** Draws the coverage of all policies, with a cursor at the present step. */
 function drawCurves(canvas, { episodes, last, step, data }) {
-  const goal = episodes[0].coverage_goal, plot = curvesOf(canvas, last, goal);
+  const goal = episodes[0].coverage_goal, plot = curvesOf(canvas, last);
   plot.level(goal);
   data.behind.forEach((moment, i) => {
     if (moment === null) return;
@@ -83,9 +90,9 @@ function drawCurves(canvas, { episodes, last, step, data }) {
   });
 }
 
-function curvesOf(canvas, last, goal) {
+function curvesOf(canvas, last) {
   const x = { low: 0, high: last || 1, label: "", say: (value) => (value ? `${value}` : "step 0") };
-  const y = { low: 0, high: 1, label: `coverage, dashed: the goal of ${percent(goal, 0)}`, say: (value) => percent(value, 0) };
+  const y = { low: 0, high: 1, label: "", say: (value) => percent(value, 0) };
   return chart(canvas, x, y, CURVES);
 }
 

@@ -11,10 +11,9 @@ function tickSpacing(range, most) {
 /**
  * Draws axes on a canvas and gives what draws inside them.
  *
- * x and y: {low, high, label, say: number => text}; margins are pixels, and tell whether the label
- * of y stands inside.
+ * x and y: {low, high, label, say: number => text}; margins are pixels.
  */
-function chart(canvas, x, y, margins = { left: 60, right: 16, top: 28, bottom: 40, inside: false }) {
+function chart(canvas, x, y, margins = { left: 60, right: 16, top: 28, bottom: 40 }) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const pen = penOf(canvas, width, height);
   const box = { left: margins.left, right: width - margins.right, top: margins.top, bottom: height - margins.bottom };
@@ -35,7 +34,7 @@ function chart(canvas, x, y, margins = { left: 60, right: 16, top: 28, bottom: 4
     for (const value of ticks(x, (box.right - box.left) / 76)) {
       write(x.say(value), across(value), box.bottom + 6, "center", "top");
     }
-    write(y.label, margins.inside ? box.left + 6 : 4, margins.inside ? box.top + 8 : 4, "left", "top");
+    write(y.label, 4, 4, "left", "top");
     write(x.label, box.right, box.bottom + 22, "right", "top");
   }
 

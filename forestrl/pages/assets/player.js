@@ -12,7 +12,7 @@ class Player {
     this.step = 0;
     this.playing = false;
     this.view = this.episodes.length === 1 && innerWidth > 560 ? "both" : "map";
-    this.cards = this.episodes.map((episode, i) => new Card(episode, i));
+    this.cards = this.episodes.map((episode, i) => new Card(episode, i, data.behind[i]));
     byId("episodes").append(...this.cards.map((card) => card.element));
     byId("episodes").classList.toggle("alone", this.episodes.length === 1);
     this.curve = byId("curves");
@@ -110,12 +110,7 @@ class Player {
     const [first] = this.episodes, { about } = this.data;
     byId("about").textContent = `${first.rows} × ${first.columns} cells, sensor range ${first.lidar_range} cells, goal ${percent(first.coverage_goal, 0)}`;
     byId("facts").append(...about.flatMap(([name, value]) => [make("dt", {}, name), make("dd", { class: "code" }, value)]));
-    byId("moments").append(...this.episodes.flatMap((episode, i) => {
-      const link = (step, text) => make("a", { href: `#step=${step}` }, `${words(episode.name)} ${text} at step ${step}`);
-      const behind = this.data.behind[i], covered = percent(episode.coverage[episode.steps]);
-      const end = link(episode.steps, episode.endsAtGoal() ? "reaches the goal" : `ends with ${covered}`);
-      return behind === null ? [end] : [link(behind, "falls behind for good"), end];
-    }));
+    byId("curves-say").textContent = `coverage over the steps; dashed: the goal of ${percent(first.coverage_goal, 0)}`;
   }
 
   listen() {
@@ -147,4 +142,8 @@ class Player {
   }
 }
 
-const player = readData().then((data) => new Player(data));
+const player = readData().then((data) => {
+  const shown = new Player(data);
+  document.body.dataset.ready = "true";
+  return shown;
+});
