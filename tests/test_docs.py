@@ -65,6 +65,20 @@ def test_the_page_on_extending_runs_as_it_stands(tmp_path):
     assert list(tmp_path.glob("outputs/render/*/episode.gif"))
 
 
+@pytest.mark.slow
+def test_the_page_on_looking_at_episodes_runs_as_it_stands(tmp_path):
+    write_files("show.md", tmp_path)
+    (text,) = (text for kind, text in blocks("show.md") if kind == "bash")
+    lines = [shlex.split(line, comments=True) for line in text.splitlines()]
+    for i, (_, command, *rest) in enumerate(lines):
+        words = [sys.executable, "-m", f"forestrl.{command}", *rest, f"hydra.run.dir={i}"]
+        done = run([*words, "show.steps=20"], tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert (tmp_path / str(i) / "episode.html").is_file()
+    assert run([sys.executable, "look.py"], tmp_path).returncode == 0
+    assert (tmp_path / "look.html").stat().st_size > 10_000
+
+
 def explained():
     """The metrics that the page names, with the levels written out."""
     names = re.findall(

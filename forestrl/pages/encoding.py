@@ -15,6 +15,10 @@ from forestrl.rendering.scene import Cell
 from forestrl.status import Status
 
 _COVERAGE, _SHARES, _SCORES = 5, 1000, 4  # decimals, parts of one, decimals
+_COLUMNS = (
+    *("changes", "agent", "coverage", "feasible", "proposed", "executed", "collided", "status"),
+    *("probability", "waypoints", "viewpoints", "scores", "way"),
+)
 _NONE = -1
 _VALUES = 4  # more than any value of a cell
 
@@ -61,9 +65,7 @@ def encode(recording: Recording) -> dict[str, Any]:
 def decode(data: dict[str, Any]) -> Recording:
     """Reads a recording back; what was rounded stays so."""
     shape = data["rows"], data["columns"]
-    names = ("changes", "agent", "coverage", "feasible", "proposed", "executed", "collided")
-    names += ("status", "probability", "waypoints", "viewpoints", "scores", "way")
-    columns = [data[name] for name in names]
+    columns = [data[name] for name in _COLUMNS]
     trees = np.repeat(np.arange(len(data["trees"])) % 2 == 1, data["trees"])
     return Recording(
         trees=trees.reshape(shape),
