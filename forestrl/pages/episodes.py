@@ -15,8 +15,6 @@ from forestrl.pages.recording import Recording
 
 STYLES = ("look.css", "episode.css")
 SCRIPTS = ("common.js", "chart.js", "episode.js", "arena.js", "decision.js", "card.js", "player.js")
-DRAWING = SCRIPTS[:4]
-"""What draws charts and arenas, without the player."""
 
 
 def episode_page(
@@ -37,11 +35,6 @@ def episode_page(
     """
     data = packed(episode_data(recordings, title, about or {}))
     return fill("episode.html", STYLES, SCRIPTS, title=html.escape(title), data=data)
-
-
-def empty_page() -> str:
-    """Gives the page without a title and data, for a program that puts both in."""
-    return fill("episode.html", STYLES, SCRIPTS, title="An episode", data="")
 
 
 def episode_data(

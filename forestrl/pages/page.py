@@ -69,17 +69,3 @@ def unpacked(page: str) -> dict[str, Any]:
     if found is None:
         raise ValueError("this is not a page with data in it")
     return json.loads(zlib.decompress(base64.b64decode(found[1])))
-
-
-def table(rows: Sequence[Sequence[str]], head: Sequence[str], caption: str) -> str:
-    """Writes a table in HTML, the first entry of each row being its name; entries are HTML."""
-    top = "".join(f'<th scope="col">{each}</th>' for each in head)
-    lines = "".join(
-        f'<tr><th scope="row">{row[0]}</th>{"".join(f"<td>{each}</td>" for each in row[1:])}</tr>'
-        for row in rows
-    )
-    return (
-        f'<div class="wide" tabindex="0" role="region" aria-label="{html.escape(caption)}"><table>'
-        f"<caption>{html.escape(caption)}</caption><thead><tr>{top}</tr></thead>"
-        f"<tbody>{lines}</tbody></table></div>"
-    )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from forestrl.pages import episode_page, read_episodes
-from forestrl.pages.page import packed, table, unpacked
+from forestrl.pages.page import packed, unpacked
 from tests.pages import episodes
 
 
@@ -70,12 +70,6 @@ def test_data_is_packed_and_unpacked():
     assert unpacked(f'<script type="text/plain" id="data">{text}</script>') == data
     with pytest.raises(ValueError, match="not a page"):
         unpacked("<p>nothing</p>")
-
-
-def test_a_table_has_its_head_and_its_rows():
-    text = table([["a", "1"], ["b", "2"]], ["", "n"], "Numbers < 3")
-    assert text.count("<tr>") == 3 and '<th scope="row">b</th><td>2</td>' in text
-    assert "<caption>Numbers &lt; 3</caption>" in text
 
 
 def test_a_notebook_shows_the_page_in_a_frame():

@@ -91,8 +91,8 @@ function drawCurves(canvas, { episodes, last, step, data }) {
 }
 
 function curvesOf(canvas, last) {
-  const x = { low: 0, high: last || 1, label: "", say: (value) => (value ? `${value}` : "step 0") };
-  const y = { low: 0, high: 1, label: "", say: (value) => percent(value, 0) };
+  const x = { low: 0, high: last || 1, say: (value) => (value ? `${value}` : "step 0") };
+  const y = { low: 0, high: 1, say: (value) => percent(value, 0) };
   return chart(canvas, x, y, CURVES);
 }
 

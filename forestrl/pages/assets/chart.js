@@ -11,9 +11,9 @@ function tickSpacing(range, most) {
 /**
  * Draws axes on a canvas and gives what draws inside them.
  *
- * x and y: {low, high, label, say: number => text}; margins are pixels.
+ * x and y: {low, high, say: number => text}; margins are pixels.
  */
-function chart(canvas, x, y, margins = { left: 60, right: 16, top: 28, bottom: 40 }) {
+function chart(canvas, x, y, margins) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const pen = penOf(canvas, width, height);
   const box = { left: margins.left, right: width - margins.right, top: margins.top, bottom: height - margins.bottom };
@@ -21,7 +21,7 @@ function chart(canvas, x, y, margins = { left: 60, right: 16, top: 28, bottom: 4
   const down = (value) => box.bottom - ((box.bottom - box.top) * (value - y.low)) / (y.high - y.low || 1);
   pen.font = "12px system-ui, sans-serif";
   axes();
-  return { line, band, dot, upright, level };
+  return { line, dot, upright, level };
 
   function axes() {
     pen.lineWidth = 1;
@@ -34,8 +34,6 @@ function chart(canvas, x, y, margins = { left: 60, right: 16, top: 28, bottom: 4
     for (const value of ticks(x, (box.right - box.left) / 76)) {
       write(x.say(value), across(value), box.bottom + 6, "center", "top");
     }
-    write(y.label, 4, 4, "left", "top");
-    write(x.label, box.right, box.bottom + 22, "right", "top");
   }
 
   function ticks(axis, most) {
@@ -61,15 +59,6 @@ function chart(canvas, x, y, margins = { left: 60, right: 16, top: 28, bottom: 4
     pen.setLineDash(dash);
     stroke(xs.map((value, i) => [across(value), down(ys[i])]));
     pen.setLineDash([]);
-    pen.globalAlpha = 1;
-  }
-
-  function band(xs, low, high, ink) {
-    const edge = [...xs.map((value, i) => [value, high[i]]), ...xs.map((value, i) => [value, low[i]]).reverse()];
-    Object.assign(pen, { fillStyle: ink, globalAlpha: 0.16 });
-    pen.beginPath();
-    edge.forEach(([left, top]) => pen.lineTo(across(left), down(top)));
-    pen.fill();
     pen.globalAlpha = 1;
   }
 
