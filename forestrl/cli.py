@@ -11,6 +11,7 @@ COMMANDS = {
     "train": "train a policy with PPO",
     "eval": "measure a policy on fixed arenas",
     "render": "draw an episode",
+    "show": "write a page that plays an episode",
     "figures": "draw the figures from their result files",
     "bench": "measure frames per second on this machine",
     "collisions": "count collisions with and without the filter",

@@ -13,10 +13,10 @@ L0 = {"functional", "kernels"}
 L1 = {"keys", "paper", "sampling", "settings", "statistics", "status", "storage"}
 L1 |= {"progress", "wording"}
 L2 = {"envs", "policies", "planners", "learning"}
-STUDIES = {"evaluation", "publishing", "rendering", "benchmark", "sweeps", "tables"}
+STUDIES = {"evaluation", "publishing", "rendering", "pages", "benchmark", "sweeps", "tables"}
 L3 = {"config", "command", "loggers", "build", "runs"}
 LIGHT = {"config", "command", "settings", "shared"}
-L4 = {"train", "eval", "render", "collisions", "bench", "figures", "export", "dashboard", "plan"}
+L4 = {"train", "eval", "render", "collisions", "bench", "figures", "export", "dashboard", "plan", "show"}
 ROOMS = {  # room: the other rooms it may import from
     "": set(),
     "functional": set(),
@@ -32,6 +32,7 @@ ROOMS = {  # room: the other rooms it may import from
     "planner": L0 | L1 | L2 | {"", "explorer", "released"},
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
+    "pages": L0 | L1 | {"", "rendering"},
     "benchmark": L0 | L1 | L2 | {"explorer", "planner"},
     "tables": {"statistics"},
     "sweeps": {"evaluation", "statistics", "storage", "tables"},

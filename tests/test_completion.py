@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from forestrl.cli import COMMANDS
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -42,7 +44,7 @@ def completed(line, home):
 @pytest.mark.parametrize(
     ("line", "offers"),
     [
-        ("forestrl ", ["train", "eval", "render", "figures", "bench", "collisions", "dashboard"]),
+        ("forestrl ", [*COMMANDS]),
         ("forestrl re", ["render"]),
         ("forestrl train env.s", ["env.seed=", "env.size="]),
         ("forestrl eval policy=in", ["information_gain", "information_gain_tuned"]),

@@ -6,24 +6,27 @@ from typing import Any
 
 import numpy as np
 import torch
+from tensordict import TensorDictBase
 from torch import Tensor
 
 from forestrl import keys as K
 from forestrl.explorer.compiled import Weights
-from forestrl.explorer.deciding import decide
+from forestrl.explorer.deciding import compared, decide
 from forestrl.kernels.batches import grids, over_batch, rows
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.steps import EXPLORING, status_at_end
+from forestrl.planners.viewpoints import considered
 from forestrl.planners.viewpoints.path_gain import (
     COUNTS,
     GRID,
     SEEN,
     action_to,
     look,
+    outlook,
     remembered_views,
 )
 from forestrl.planners.viewpoints.paths import first_step, paths_from
-from forestrl.planners.viewpoints.scores import NOWHERE, Memory, remember
+from forestrl.planners.viewpoints.scores import NOWHERE, Memory, no_memory, remember
 from forestrl.planners.viewpoints.sight import Sight, sight
 from forestrl.planners.viewpoints.views import Views
 from forestrl.settings import not_allowed
@@ -99,6 +102,18 @@ class ViewpointPolicy(ClassicalPlanner):
             entries[K.TARGET].numpy(),
         )
         return action, status
+
+    def viewpoints(self, step: TensorDictBase) -> considered.Viewpoints:
+        """Gives what is compared in a state without batch dimensions, before the decision."""
+        at, memory = outlook(step, self.lidar_range), no_memory()
+        for key, part in zip((HEADING, GOAL, IDLE), memory, strict=True):
+            if (value := step.get(key, None)) is not None:
+                part[:] = value.cpu().numpy()
+        share = self.coverage_goal
+        where = (at.views, at.lines, at.stride, at.paths, memory, self.weights, share)
+        cells, scores, _ = compared(*where)
+        goal, _ = decide(*where)
+        return considered.compared(at, cells, scores, goal)
 
 
 @over_batch

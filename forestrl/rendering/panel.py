@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 # After Okabe and Ito, for readers who see few colours; waypoints differ in shape as well.
 INK, PAPER, FAINT, PALE = (38, 38, 38), (255, 255, 255), (128, 128, 128), (200, 200, 200)
 GROUND, TRUNK = (243, 239, 230), (84, 68, 54)
-UNKNOWN, FREE, OCCUPIED = (189, 189, 189), (255, 255, 255), (60, 60, 60)
+UNKNOWN, FREE, OCCUPIED = (206, 206, 206), (255, 255, 255), (60, 60, 60)
 SOLID = (150, 150, 150)  # what is occupied, at large
 VEILED = (166, 156, 146)  # a trunk that is unknown yet
 AGENT, FRONTIER = (0, 114, 178), (230, 159, 0)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import numpy as np
 import torch
+from tensordict import TensorDictBase
 from torch import Tensor
 
 from forestrl import keys as K
@@ -14,6 +15,7 @@ from forestrl.kernels.batches import grids, over_batch, rows
 from forestrl.kernels.compiling import compiled
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.steps import EXPLORING, status_at_end
+from forestrl.planners.viewpoints.considered import Outlook, Viewpoints, compared, spread
 from forestrl.planners.viewpoints.paths import first_step, paths_from
 from forestrl.planners.viewpoints.scores import NOWHERE, path_gain
 from forestrl.planners.viewpoints.sight import Sight, sight
@@ -67,6 +69,35 @@ class PathGain(ClassicalPlanner):
         results = action.numpy(), status.numpy(), entries[K.TARGET].numpy()
         _plan(grids(cells), place, *remembered, lines, self.power, *results)
         return action, status
+
+    def viewpoints(self, step: TensorDictBase) -> Viewpoints:
+        """Gives the best viewpoints of a state without batch dimensions, before the decision."""
+        at = outlook(step, self.lidar_range)
+        cells = at.paths.order[1:][at.paths.gains[at.paths.order[1:]] > 0]
+        gain = (at.paths.gains + at.views.counts)[cells]
+        scores = gain / at.paths.lengths[cells].astype(float) ** self.power
+        few = spread(at, cells, scores)
+        return compared(at, cells[few], scores[few], path_gain(at.views, at.paths, self.power))
+
+
+def outlook(step: TensorDictBase, lidar_range: float) -> Outlook:
+    """Looks around with what a planner remembers, leaving that as it is.
+
+    Args:
+        step: a state without batch dimensions.
+        lidar_range: sensor range ``l``, cells.
+    """
+    cells, (row, col) = step[K.CELLS].cpu(), step[K.POSITION].tolist()
+    lines = sight(lidar_range, cells.shape[1])
+    entries: dict[Key, Tensor] = {K.CELLS: cells[None]}
+    for key in (GRID, SEEN, COUNTS):
+        if (value := step.get(key, None)) is not None:
+            entries[key] = value[None].cpu().clone()
+    grid, seen, counts = remembered_views(entries, lines)
+    views = Views(grid[0], seen[0], counts[0])
+    source = look(views, lines, cells.numpy(), row, col)
+    stride = cells.shape[1] + 2 * lines.margin
+    return Outlook(views, lines, stride, paths_from(views, lines, source))
 
 
 def remembered_views(entries: dict[Key, Tensor], lines: Sight) -> Sequence[np.ndarray]:
