@@ -68,9 +68,9 @@ def check() -> None:
 
 
 def saved() -> None:
-    """Says that nothing is left to be saved: a further signal ends the program at once."""
+    """Says that nothing is left to be saved: once asked to stop, the next signal ends it at once."""
     for number in _SIGNALS:
-        if signal.getsignal(number) == _stop:
+        if _asked and signal.getsignal(number) == _stop:
             signal.signal(number, signal.SIG_DFL)
 
 
