@@ -51,8 +51,8 @@ class PolicyIteration:
     def __init__(
         self,
         start: LinearScore,
-        rounds: Annotated[int, Range(1, 100)] = 2,
-        arenas: Annotated[int, Range(100, 10_000_000)] = 2500,
+        rounds: Annotated[int, Range(1, 100)] = 3,
+        arenas: Annotated[int, Range(100, 10_000_000)] = 800,
         rate: Annotated[float, Range(above=0, high=1)] = 0.03,
         options: Annotated[int, Range(2, 64)] = 5,
         epochs: Count = 8,
