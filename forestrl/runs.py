@@ -21,7 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
 from forestrl.records import MARK, SWEEP_FILE
-from forestrl.storage import clear_parts
+from forestrl.storage import clear_parts, is_part
 
 _LOCK = "lock"
 _OF_NO_WORTH = (MARK, SWEEP_FILE)
@@ -113,6 +113,8 @@ def _obstacle(folder: Path) -> str | None:
     if ran and _worth(folder):
         _leave(folder)
         return "it holds a run already"
+    if ran:
+        clear_parts(folder)
     return None
 
 
@@ -195,7 +197,9 @@ def _worth(folder: Path) -> list[Path]:
     return [
         path
         for path in folder.iterdir()
-        if path.name not in _OF_NO_WORTH and not (path.suffix == ".log" and not path.stat().st_size)
+        if path.name not in _OF_NO_WORTH
+        and not is_part(path)
+        and not (path.suffix == ".log" and not path.stat().st_size)
     ]
 
 

@@ -68,7 +68,7 @@ def check() -> None:
 
 
 def saved() -> None:
-    """Says that nothing is left to be saved: once asked to stop, the next signal ends it at once."""
+    """Says that nothing is left to be saved: once asked to stop, a further signal ends it."""
     for number in _SIGNALS:
         if _asked and signal.getsignal(number) == _stop:
             signal.signal(number, signal.SIG_DFL)

@@ -7,6 +7,7 @@ import io
 import math
 import numbers
 import os
+import re
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -66,8 +67,13 @@ def atomic_write(
 
 def clear_parts(folder: Path) -> None:
     """Removes what writers that were killed left behind, in a folder that nobody writes into."""
-    for part in folder.rglob(f".*{_PART}"):
-        part.unlink(missing_ok=True)
+    for path in filter(is_part, folder.rglob(f".*{_PART}")):
+        path.unlink(missing_ok=True)
+
+
+def is_part(path: Path) -> bool:
+    """Tells whether a file is one that is being written, or was when its writer was killed."""
+    return re.fullmatch(rf"\..+\.[0-9a-f]{{8}}\{_PART}", path.name) is not None
 
 
 def csv_text(rows: Iterable[Sequence[Any]]) -> str:

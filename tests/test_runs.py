@@ -90,6 +90,7 @@ def test_what_a_killed_run_left_is_no_obstacle_if_it_is_empty(claim, tmp_path):
     assert claim("run", "hydra.run.dir=mine", stop=True) == "mine"
     (tmp_path / "mine/.hydra/config.yaml").touch()
     (tmp_path / "mine/train.log").touch()
+    (tmp_path / "mine/.metrics.csv.0123abcd.part").touch()
     assert claim("run", "hydra.run.dir=mine", stop=True) == "mine"
     (tmp_path / "mine/metrics.csv").touch()
     assert "it holds a run already" in claim("run", "hydra.run.dir=mine")

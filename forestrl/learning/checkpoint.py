@@ -116,4 +116,4 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         return torch.load(io.BytesIO(data), weights_only=True)
     except Exception as error:
-        raise ValueError(f"{path} is damaged and cannot be resumed from: {error}") from error
+        raise ValueError(f"{path} is damaged, and cannot be resumed from") from error

@@ -106,6 +106,6 @@ def _step(line: str, columns: int) -> int | None:
         (cells,) = csv.reader([line])
         [float(cell) for cell in cells if cell]
         step = int(cells[0])
-    except ValueError:
+    except (ValueError, IndexError):
         return None
     return step if line.endswith(_END) and len(cells) == columns else None

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import torch
 
-import forestrl.jobs.train  # noqa: F401  (once, for all children)
+import forestrl.jobs.train  # once, for all children
 from forestrl.learning.checkpoint import load_training
 from forestrl.policies.files import load_policy
 from tests.commands import forestrl, rows
