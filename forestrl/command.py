@@ -6,9 +6,10 @@ import os
 import re
 import shlex
 import sys
+import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +21,15 @@ from hydra.utils import to_absolute_path
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from forestrl import runs
-from forestrl.config import CONF_DIR, check_all, followed, kinds_of, leaves, text_settings
-from forestrl.help import help_text
+from forestrl import records, runs
+from forestrl.command_line import prepare_words, typed
+from forestrl.config import CONF_DIR, check_all, followed, kinds_of, leaves
 from forestrl.settings import is_path
+from forestrl.stopping import Stopped, saved, stopping
 from forestrl.terminal import lasting_output
 from forestrl.wording import nearest
 
 _USER_ERRORS = (ValueError, OSError, HydraException, OmegaConfBaseException)
-_WITH_A_WORD = (
-    *("--config-dir", "-cd", "--config-path", "-cp", "--config-name", "-cn"),
-    *("--cfg", "-c", "--package", "-p", "--experimental-rerun"),
-)
-_LATEST = "checkpoint=latest"
-_NUMBER = re.compile(r"[-+]?(\d[\d_]*\.?[\d_]*|\.\d+)(e[-+]?\d+)?|[-+]?(inf|nan)|true|false", re.I)
-_PLAIN = re.compile(r"[\w./:@%+-]+", re.ASCII)  # the same to the shell and to Hydra
 _FULL_ERROR = os.environ.get("HYDRA_FULL_ERROR") == "1"  # as the user set it; main() sets it too
 
 Job = Callable[[DictConfig], Any]
@@ -61,7 +56,7 @@ def command(name: str, settings: Any = None) -> Callable[[Job], Callable[[], Any
             if HydraConfig.get().job.chdir:
                 cfg = _with_absolute_paths(cfg, settings)
             try:
-                return function(cfg)
+                return _once(function, cfg)
             except (MemoryError, RuntimeError) as error:
                 if "alloc" not in str(error):
                     raise
@@ -74,17 +69,28 @@ def command(name: str, settings: Any = None) -> Callable[[Job], Callable[[], Any
         )
 
         def started() -> Any:
-            _prepare_words(name, settings)
+            prepare_words(name, settings)
             return entry()
 
         @wraps(function)
         def main() -> Any:
-            with lasting_output():
+            with lasting_output(), stopping():
                 return _run(name, started)
 
         return main
 
     return decorate
+
+
+def _once(function: Job, cfg: DictConfig) -> Any:
+    """Calls a job, but for one of a sweep that is finished, and notes that it is."""
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    if _is_swept() and (done := records.finished(folder)) is not None:
+        print(f"{folder}: finished, there is nothing left to do")
+        return done["result"]
+    result = function(cfg)
+    records.mark_finished(run_folder(cfg), result)
+    return result
 
 
 def _in_one_line(name: str, job: Job) -> Job:
@@ -94,97 +100,122 @@ def _in_one_line(name: str, job: Job) -> Job:
     def wrapped(cfg: DictConfig) -> Any:
         try:
             return job(cfg)
-        except _USER_ERRORS as error:
-            if _debug():
-                raise
+        except Stopped as stopped:
+            if "resume" in cfg and not _is_swept() and runs.has_worth(run_folder(cfg)):
+                stopped.how_to_go_on = f"forestrl {name} {typed('resume', run_folder(cfg))}"
+            raise
+        except Exception as error:
+            user_error = isinstance(error, _USER_ERRORS) and not _debug()
             text = _with_whole_names(describe(error), cfg)
-            if HydraConfig.get().mode == RunMode.MULTIRUN:
+            if _is_swept():
+                _note(text if user_error else "".join(traceback.format_exception(error)))
+            if not user_error:
+                raise
+            if _is_swept():
                 raise ValueError(text) from error
             _fail(name, text)  # Hydra would say more about it
 
     return wrapped
 
 
+def _is_swept() -> bool:
+    return HydraConfig.get().mode == RunMode.MULTIRUN
+
+
+def _note(text: str) -> None:
+    """Writes an error into the log of a sweep's job."""
+    with suppress(OSError), _log(Path(HydraConfig.get().runtime.output_dir)).open("a") as log:
+        log.write(text.rstrip() + "\n")
+
+
+def _log(job: Path) -> Path:
+    """The log of a sweep's job."""
+    return job / f"{OmegaConf.load(job / records.MARK / 'hydra.yaml').hydra.job.name}.log"
+
+
 def _run(name: str, entry: Callable[[], Any]) -> Any:
     os.environ["HYDRA_FULL_ERROR"] = "1"  # errors reach the lines below instead of a print
+    words = sys.argv[1:]
     try:
-        return entry()
+        result = entry()
+        if (sweep := runs.sweep_folder()) and not records.jobs(sweep):
+            _fail(name, "the sweep is empty: a setting that it sweeps over has no values")
+        return result
+    except Stopped as stopped:
+        saved()
+        if sweep := runs.sweep_folder():
+            others = [word for word in words if records.setting(word) != "hydra.sweep.dir"]
+            again = f"{shlex.join(others)} {typed('hydra.sweep.dir', sweep)}"
+            stopped.how_to_go_on = f"forestrl {name} {again}"
+        print(f"forestrl {name}: {stopped}", file=sys.stderr)
+        sys.exit(stopped.status)
     except runs.Refusal as refusal:
         _fail(name, describe(refusal.__cause__ or refusal))
-    except _USER_ERRORS as error:
-        if _debug():
+    except Exception as error:
+        failed = _failed_jobs(runs.sweep_folder())
+        if _debug() or not (failed or isinstance(error, _USER_ERRORS)):
             raise
-        _fail(name, describe(error))
+        _fail(name, *(failed or [describe(error)]))
     finally:
         runs.leave()
         del os.environ["HYDRA_FULL_ERROR"]
 
 
+def _failed_jobs(sweep: Path | None) -> list[str]:
+    """Names the jobs of a sweep that failed, with what their logs say last."""
+    lines = []
+    for job in records.jobs(sweep) if sweep else []:
+        log = _log(job)
+        if records.finished(job) is None and log.is_file() and log.stat().st_size:
+            words = " ".join(records.began_with(job))
+            lines.append(f"{log}: job {job.name} ({words}) failed: {_last_line(log)}")
+    return lines
+
+
+def _last_line(log: Path) -> str:
+    return log.read_text(errors="replace").rstrip().rpartition("\n")[2]
+
+
 def asked_for() -> set[str]:
     """Names the settings given on the command line or by the sweep, without their values."""
-    return {_setting(override) for override in HydraConfig.get().overrides.task}
-
-
-def _setting(override: str) -> str:
-    return override.lstrip("+~").partition("=")[0]
+    return {records.setting(override) for override in HydraConfig.get().overrides.task}
 
 
 def run_folder(cfg: DictConfig) -> Path:
     """Gives the folder that a command writes into: of an earlier run if it goes on with one."""
     resume, job = cfg.get("resume"), HydraConfig.get()
-    if resume is None or job.mode == RunMode.RUN:
+    if job.mode == RunMode.RUN:
         return Path(job.runtime.output_dir)
+    if resume is None:
+        return runs.take(Path(job.runtime.output_dir))
     return runs.take_up(Path(resume), job.job.name)
 
 
-def _prepare_words(name: str, settings: Any) -> None:
-    """Puts the words of the command line into the form that Hydra wants."""
-    options, overrides = _sorted(sys.argv[1:])
-    texts = (*text_settings(settings), "hydra.run.dir", "hydra.sweep.dir")
-    overrides = [_as_text(each) if _setting(each) in texts else each for each in overrides]
-    if _LATEST in overrides and "checkpoint" in texts and not Path("latest").exists():
-        latest = runs.latest_training()
-        print(f"{_LATEST}: {latest}", file=sys.stderr)
-        overrides[overrides.index(_LATEST)] = f"checkpoint={runs.quoted(str(latest))}"
-    if {"-h", "--help"} & set(options):
+def configuration(
+    cfg: DictConfig, folder: Path, why_not: Callable[[str], str | None]
+) -> DictConfig:
+    """Gives the configuration of a run: its own if it goes on, with what is asked for now.
 
-        def template(*, _root_: DictConfig) -> str:
-            return help_text(name, _root_, settings).replace("$", "$$")
+    Args:
+        cfg: what the command line gives.
+        folder: of the run.
+        why_not: why a setting cannot be changed on the way; None if it can.
 
-        OmegaConf.register_new_resolver("help", template, replace=True)
-        overrides.append("hydra.help.template=${help:}")
-    sys.argv[1:] = [*options, *overrides]
-
-
-def _sorted(words: list[str]) -> tuple[list[str], list[str]]:
-    """Parts Hydra's options from the settings, which it wants side by side."""
-    options: list[str] = []
-    overrides: list[str] = []
-    for before, word in pairwise(["", *words]):
-        option = word.startswith("-") or before in _WITH_A_WORD
-        (options if option else overrides).append(word)
-    return options, overrides
-
-
-def _as_text(word: str) -> str:
-    """Quotes what Hydra would not take as it is: a folder may be called ``1e3`` or ``beta=0.5``."""
-    key, _, value = word.partition("=")
-    if re.search(r"['\"()\[\]{}$]", value):  # written in Hydra's own grammar
-        return word
-    plain = [bool(_PLAIN.fullmatch(p)) and not _NUMBER.fullmatch(p) for p in value.split(",")]
-    parts = zip(value.split(","), plain, strict=True)
-    return f"{key}={','.join(part if fits else runs.quoted(part) for part, fits in parts)}"
-
-
-def typed(name: str, value: object) -> str:
-    """Writes a setting so that it can be pasted into a shell.
-
-    >>> print(typed("checkpoint", "outputs/a b=c"))
-    'checkpoint="outputs/a b=c"'
+    Raises:
+        ValueError: if one is asked for that cannot.
     """
-    text = str(value)
-    plain = _PLAIN.fullmatch(text) and text != "null"
-    return shlex.quote(f"{name}={text if plain else runs.quoted(text)}")
+    if cfg.resume is None:
+        return cfg
+    job = HydraConfig.get()
+    choices = {str(group): str(option) for group, option in job.runtime.choices.items()}
+    return records.resumed(cfg, folder, list(job.overrides.task), choices, why_not)
+
+
+def keep(cfg: DictConfig, folder: Path) -> None:
+    """Notes that a run goes on, and with which settings."""
+    records.unmark(folder)
+    if "resume" in asked_for():
+        records.record(cfg, folder, list(HydraConfig.get().overrides.task))
 
 
 def _with_absolute_paths(cfg: DictConfig, settings: Any) -> DictConfig:
@@ -201,9 +232,10 @@ def _debug() -> bool:
     return _FULL_ERROR or any(argument.lower() == "debug=true" for argument in sys.argv)
 
 
-def _fail(name: str, text: str) -> None:
-    """Says in one line why the command ends, with status 1."""
-    print(f"forestrl {name}: {text}", file=sys.stderr)
+def _fail(name: str, *reasons: str) -> None:
+    """Says in one line each why the command ends, with status 1."""
+    for reason in reasons:
+        print(f"forestrl {name}: {reason}", file=sys.stderr)
     sys.exit(1)
 
 

@@ -17,14 +17,21 @@ from typing import Any
 from hydra.core.override_parser.types import Quote, QuotedString
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf, read_write
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
-_MARK, _LOCK = ".hydra", "lock"
-_OF_NO_WORTH = (_MARK, "multirun.yaml")
+from forestrl.records import MARK, SWEEP_FILE
+from forestrl.storage import clear_parts, is_part
+
+_LOCK = "lock"
+_OF_NO_WORTH = (MARK, SWEEP_FILE)
 _TRAININGS = Path("outputs/train")
 _CLOCK = "${now:"  # in the name of a folder that may as well have another name
 
 _claimed: dict[Path, tuple[int, list[Path]]] = {}
 """This process's folders: the lock's file, and the folders made for it, the outermost last."""
+_sweeps: list[Path] = []
+"""The folder of the sweep that this process runs, if it does."""
 
 
 class Refusal(BaseException):
@@ -55,6 +62,7 @@ class OwnFolder(Callback):
             folder = str(_claim(config, "sweep"))
         except (OSError, ValueError) as error:
             raise Refusal from error
+        _sweeps.append(Path(folder))
         with read_write(config.hydra):
             config.hydra.sweep.dir = folder
             config.hydra.overrides.hydra.append(f"hydra.sweep.dir={quoted(folder)}")
@@ -84,6 +92,8 @@ def _claim(config: DictConfig, kind: str) -> Path:
     if _CLOCK in str(OmegaConf.to_container(config.hydra[kind], resolve=False)):
         numbered = (folder.with_name(f"{folder.name}-{number}") for number in count(2))
         return next(path for path in chain([folder], numbered) if _obstacle(path) is None)
+    if kind == "sweep" and _began_as(folder, config):
+        return take(folder)
     if (obstacle := _obstacle(folder)) is not None:
         more = (
             f", or go on with it: resume={folder}" if kind == "run" and "resume" in config else ""
@@ -99,11 +109,29 @@ def _obstacle(folder: Path) -> str | None:
     """Says why a folder cannot be had; None if it could, and now is this process's."""
     if not _lock(folder):
         return "another run is writing into it"
-    ran = (folder / _MARK / "config.yaml").exists() or any(folder.glob(f"*/{_MARK}"))
+    ran = (folder / MARK / "config.yaml").exists() or any(folder.glob(f"*/{MARK}"))
     if ran and _worth(folder):
         _leave(folder)
         return "it holds a run already"
+    if ran:
+        clear_parts(folder)
     return None
+
+
+def _began_as(folder: Path, config: DictConfig) -> bool:
+    """Tells whether the sweep that began in a folder is this one, which then goes on there."""
+    try:
+        began: Any = OmegaConf.load(folder / SWEEP_FILE)
+        return _asked(began) == _asked(config)
+    except (OSError, ValueError, AttributeError, YAMLError, OmegaConfBaseException):
+        return False
+
+
+def _asked(config: DictConfig) -> tuple[Any, ...]:
+    """What tells one sweep from another."""
+    settings: Any = OmegaConf.to_container(config, resolve=False)
+    hydra = settings.pop("hydra")
+    return settings, hydra["job"]["name"], hydra["overrides"]["task"], hydra["sweeper"]["params"]
 
 
 def take_up(folder: Path, command: str) -> Path:
@@ -113,15 +141,35 @@ def take_up(folder: Path, command: str) -> Path:
         FileNotFoundError: if no run of this command began there.
         ValueError: if another process has it.
     """
-    path = folder / _MARK / "hydra.yaml"
+    path = folder / MARK / "hydra.yaml"
     if not path.is_file():
         raise FileNotFoundError(f"resume={folder} is not a run folder: {path} does not exist")
     began_as = OmegaConf.select(OmegaConf.load(path), "hydra.job.name")
     if began_as != command:
         raise ValueError(f"resume={folder} is a run of forestrl {began_as}, not of {command}")
+    return take(folder, f"resume={folder} is not allowed: ")
+
+
+def take(folder: Path, refusal: str = "") -> Path:
+    """Claims a folder that may hold a run, and clears what a killed one left half written.
+
+    Raises:
+        ValueError: if another process has it.
+    """
     if not _lock(folder):
-        raise ValueError(f"resume={folder} is not allowed: another run is writing into it")
+        raise ValueError(f"{refusal or f'{folder}: '}another run is writing into it")
+    clear_parts(folder)
     return folder
+
+
+def sweep_folder() -> Path | None:
+    """Gives the folder of the sweep that this process runs, if it does."""
+    return _sweeps[-1] if _sweeps else None
+
+
+def has_worth(folder: Path) -> bool:
+    """Tells whether a folder holds more than its configuration and empty logs."""
+    return folder.is_dir() and bool(_worth(folder))
 
 
 def _lock(folder: Path) -> bool:
@@ -129,7 +177,7 @@ def _lock(folder: Path) -> bool:
     folder = folder.absolute()
     if folder in _claimed:
         return True
-    mark = folder / _MARK
+    mark = folder / MARK
     missing = [path for path in (mark, *mark.parents) if not path.exists()]
     mark.mkdir(parents=True, exist_ok=True)
     lock = os.open(mark / _LOCK, os.O_RDWR | os.O_CREAT)
@@ -149,19 +197,22 @@ def _worth(folder: Path) -> list[Path]:
     return [
         path
         for path in folder.iterdir()
-        if path.name not in _OF_NO_WORTH and not (path.suffix == ".log" and not path.stat().st_size)
+        if path.name not in _OF_NO_WORTH
+        and not is_part(path)
+        and not (path.suffix == ".log" and not path.stat().st_size)
     ]
 
 
 def leave() -> None:
     """Gives this process's folders free; those that it made and put nothing into disappear."""
+    _sweeps.clear()
     for folder in list(_claimed):
         _leave(folder)
 
 
 def _leave(folder: Path) -> None:
     lock, missing = _claimed.pop(folder.absolute())
-    mark = folder / _MARK
+    mark = folder / MARK
     (mark / _LOCK).unlink(missing_ok=True)
     os.close(lock)
     if mark in missing and not _worth(folder):

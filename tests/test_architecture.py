@@ -11,17 +11,29 @@ MODULES = sorted((ROOT / "forestrl").rglob("*.py"))
 
 L0 = {"functional", "kernels"}
 L1 = {"keys", "paper", "sampling", "settings", "statistics", "status", "storage"}
-L1 |= {"progress", "wording"}
+L1 |= {"arrays", "progress", "stopping", "wording"}
 L2 = {"envs", "policies", "planners", "learning"}
 STUDIES = {"evaluation", "publishing", "rendering", "pages", "benchmark", "sweeps", "tables"}
-L3 = {"config", "command", "loggers", "build", "runs"}
+L3 = {"config", "command", "loggers", "build", "records", "runs"}
 LIGHT = {"config", "command", "settings", "shared"}
-L4 = {"train", "eval", "render", "collisions", "bench", "figures", "export", "dashboard", "plan", "show"}
+L4 = {
+    "train",
+    "eval",
+    "render",
+    "collisions",
+    "bench",
+    "figures",
+    "export",
+    "dashboard",
+    "plan",
+    "show",
+}
 ROOMS = {  # room: the other rooms it may import from
     "": set(),
     "functional": set(),
     "kernels": {"functional"},
     **{name: set() for name in L1},
+    "arrays": {"storage"},
     "sampling": {"keys"},
     "settings": {"wording"},
     "signatures": {"settings"},
@@ -39,11 +51,14 @@ ROOMS = {  # room: the other rooms it may import from
     "publishing": {"evaluation", "paper", "statistics", "sweeps", "tables"},
     "config": {"settings", "signatures", "wording"},
     "help": {"config", "settings", "wording"},
-    "runs": set(),
-    "command": {"config", "help", "runs", "settings", "terminal", "wording"},
+    "records": {"settings", "storage"},
+    "runs": {"records", "storage"},
+    "command_line": {"config", "help", "records", "runs"},
+    "command": {"command_line", "config", "records", "runs", "settings", "stopping"}
+    | {"terminal", "wording"},
     "shared": {"config", "settings"},
     "loggers": {"settings", "storage"},
-    "build": L0 | L1 | L2 | STUDIES | {"config", "explorer", "loggers", "released"},
+    "build": L0 | L1 | L2 | STUDIES | {"config", "explorer", "loggers", "records", "released"},
     "jobs": {""} | L0 | L1 | L2 | STUDIES | L3 | {"explorer", "planner", "released"},
     **dict.fromkeys(L4, LIGHT | {"jobs"}),
     "completion": set(),
@@ -60,7 +75,9 @@ LIBRARIES = {  # the only libraries of these rooms, besides Python's own
     "settings": set(),
     "signatures": set(),
     "status": set(),
+    "stopping": set(),
     "storage": set(),
+    "arrays": {"numpy"},
     "statistics": {"numpy", "scipy"},
     "tables": {"tabulate"},
     "terminal": set(),

@@ -10,7 +10,14 @@ import pytest
 from omegaconf import OmegaConf
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from forestrl.loggers import CsvLogger, Loggers, NoLogger, Run, TensorboardLogger
+from forestrl.loggers import (
+    CsvLogger,
+    Loggers,
+    NoLogger,
+    Run,
+    TensorboardLogger,
+    WandbLogger,
+)
 from tests.commands import forestrl, rows, train
 
 ROLLOUT = "return coverage episode_length steps_to_80 steps_to_90 steps_to_98 finished"
@@ -142,7 +149,7 @@ def test_wandb_has_a_row_an_update_under_the_names_that_dashboards_rely_on(recor
     history = [record["item"] for record in of_type(records, "history")]
     updates = [row for row in history if "time/fps" in row]
     assert [row["frames"] for row in updates] == [256, 512, 768, 1024]
-    logged = {name for row in updates for name in row if "/" in name}
+    logged = {name for row in updates for name in row if "/" in name and "episode." not in name}
     assert logged <= NAMES
     assert all("steps_to" in name for name in NAMES - logged)  # nan where a level is not reached
     assert [row["frames"] for row in updates if "eval/auc" in row] == [512, 1024]
@@ -215,3 +222,119 @@ def test_wandb_of_an_evaluation_has_intervals_episodes_and_a_picture(tmp_path, m
     (metrics,) = rows(tmp_path / "metrics.csv")
     low, mean, high = (float(metrics[f"eval/coverage{end}"]) for end in ("_low", "", "_high"))
     assert low <= mean <= high
+
+
+class Failing(NoLogger):
+    """A logger that always fails."""
+
+    def log_metrics(self, metrics, step):
+        raise RuntimeError("no such host")
+
+
+class CannotBegin(NoLogger):
+    def __init__(self, run):
+        raise RuntimeError("quota")
+
+
+def nothing(run):
+    """A target that forgets to return its logger."""
+
+
+def test_a_logger_that_fails_is_said_once_and_the_others_go_on(path, capsys):
+    logger = Loggers(Failing(), CsvLogger(Run(path.parent)))
+    for step in (10, 20):
+        logger.log_metrics({"a": 1.0}, step=step)
+    logger.close()
+    assert len(table(path)) == 3
+    said = capsys.readouterr().err
+    assert said == "Failing failed and the run goes on: log_metrics: RuntimeError: no such host\n"
+
+
+@pytest.mark.parametrize("name", ["Failing", "CannotBegin"])
+def test_a_training_outlives_its_logger(name, tmp_path):
+    target = f"logger._target_=tests.test_loggers.{name}"
+    result = forestrl(
+        *("train", "experiment=smoke", "logger=none", target, f"hydra.run.dir={tmp_path}"),
+        *("total_frames=256", "eval.every=0"),
+    )
+    assert result.status == 0 and "failed and the run goes on" in result.err
+    assert len(rows(tmp_path / "metrics.csv")) == 1
+
+
+def test_a_target_that_gives_no_logger_is_refused_in_one_line(tmp_path):
+    target = "logger._target_=tests.test_loggers.nothing"
+    folder = f"hydra.run.dir={tmp_path}/run"
+    result = forestrl("train", "experiment=smoke", "logger=none", target, folder)
+    assert result.status == 1
+    assert "tests.test_loggers.nothing gives None: a logger has log_metrics" in result.err
+
+
+def test_csv_writes_later_what_a_full_disk_did_not_take(path, monkeypatch):
+    logger = CsvLogger(Run(path.parent))
+    logger.log_metrics({"a": 1.0}, step=10)
+    path.chmod(0o644)
+    path.rename(path.with_name("away"))
+    path.mkdir()  # nothing can be written here
+    with pytest.raises(OSError):
+        logger.log_metrics({"a": 2.0}, step=20)
+    path.rmdir()
+    logger.log_metrics({"a": 3.0}, step=30)
+    assert table(path) == [["frames", "a"], ["10", "1"], ["20", "2"], ["30", "3"]]
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"WANDB_MODE": "online"}, "WANDB_MODE=online needs a login"),
+        (
+            {"WANDB_API_KEY": "0" * 40, "WANDB_BASE_URL": "http://127.0.0.1:9"},
+            "http://127.0.0.1:9 does not answer",
+        ),
+    ],
+)
+def test_wandb_without_login_or_network_says_one_line_and_is_offline(
+    settings, said, tmp_path, monkeypatch, capsys
+):
+    for name in ("WANDB_API_KEY", "WANDB_MODE", "WANDB_BASE_URL"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in {**settings, "NETRC": str(tmp_path / "none"), "WANDB_SILENT": "1"}.items():
+        monkeypatch.setenv(name, value)
+    logger = WandbLogger(Run(tmp_path))
+    logger.log_metrics({"a": 1.0}, step=1)
+    logger.close()
+    assert capsys.readouterr().err.startswith(f"wandb: {said}")
+    assert list(tmp_path.glob("wandb/offline-run-*"))
+
+
+def test_wandb_history_of_a_training_that_goes_on_offline_is_one(tmp_path, monkeypatch):
+    monkeypatch.setenv("WANDB_MODE", "offline")
+    monkeypatch.setenv("WANDB_SILENT", "true")
+    run = train(tmp_path, "logger=wandb", "total_frames=512", "eval.every=0")
+    result = forestrl("train", f"resume={run}", "total_frames=1024")
+    assert result.status == 0, result.err
+    folders = sorted(run.glob("wandb/offline-run-*"), key=lambda path: path.stat().st_mtime)
+    assert len({path.name.rpartition("-")[2] for path in folders}) == 1
+    (one,) = {path.name for folder in folders for path in folder.glob("run-*.wandb")}
+    history = []
+    for folder in folders:
+        log = folder / one
+        command = [sys.executable, "-m", "wandb", "leet", "inspect", "--json", str(log)]
+        found = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        history += of_type([json.loads(line) for line in found.splitlines()], "history")
+    assert [record["item"]["frames"] for record in history] == [256, 512, 768, 1024]
+
+
+def test_tensorboard_of_a_training_that_goes_on_has_each_point_once(tmp_path):
+    logger = TensorboardLogger(Run(tmp_path))
+    for step in (10, 20, 30):
+        logger.log_metrics({"a": 1.0}, step=step)
+    logger.close()
+    logger = TensorboardLogger(Run(tmp_path, frames=20))
+    logger.log_metrics({"a": 2.0}, step=30)
+    logger.close()
+    events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    assert [(event.step, event.value) for event in events.Scalars("a")] == [
+        (10, 1.0),
+        (20, 1.0),
+        (30, 2.0),
+    ]

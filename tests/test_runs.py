@@ -90,6 +90,7 @@ def test_what_a_killed_run_left_is_no_obstacle_if_it_is_empty(claim, tmp_path):
     assert claim("run", "hydra.run.dir=mine", stop=True) == "mine"
     (tmp_path / "mine/.hydra/config.yaml").touch()
     (tmp_path / "mine/train.log").touch()
+    (tmp_path / "mine/.metrics.csv.0123abcd.part").touch()
     assert claim("run", "hydra.run.dir=mine", stop=True) == "mine"
     (tmp_path / "mine/metrics.csv").touch()
     assert "it holds a run already" in claim("run", "hydra.run.dir=mine")
@@ -161,7 +162,7 @@ def test_a_resumed_run_goes_on_in_its_own_folder_alone(tmp_path, monkeypatch):
     assert result.status == 0, result.err
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
     assert [row["frames"] for row in rows(tmp_path / "run/metrics.csv")] == ["256", "512"]
-    assert OmegaConf.load("run/.hydra/config.yaml").total_frames == 256  # as it began
+    assert OmegaConf.load("run/.hydra/config.yaml").total_frames == 512  # as it went on
 
 
 def test_two_processes_cannot_go_on_with_the_same_run(claim, tmp_path):
@@ -179,7 +180,6 @@ def test_a_resume_is_a_run_of_the_same_command(tmp_path, monkeypatch):
         ("eval", "TYPO", "resume=TYPO is not a run folder"),
         ("eval", "/", "resume=/ is not a run folder"),
         ("train", "done", "resume=done is a run of forestrl eval, not of train"),
-        ("eval", "done", "is finished: there is nothing left to do"),
     ):
         result = forestrl(command, f"resume={folder}")
         assert result.status == 1 and words in result.err

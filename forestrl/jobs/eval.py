@@ -8,12 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
 from tqdm.auto import tqdm
 
-from forestrl import __version__, build
-from forestrl.command import asked_for, run_folder
+from forestrl import __version__, build, records
+from forestrl.command import asked_for, configuration, keep, run_folder
 from forestrl.evaluation.episodes import Episodes, evaluate
 from forestrl.evaluation.metrics import eval_metrics
 from forestrl.evaluation.parts import Parts
@@ -22,6 +21,9 @@ from forestrl.evaluation.report import table, write_report
 from forestrl.jobs.worlds import say_world
 from forestrl.loggers import Logger, NoLogger
 from forestrl.paper import coverage_of
+from forestrl.stopping import check, saved
+
+_FREE = ("logger", "threads", "debug", "device")
 
 
 def explore(cfg: DictConfig, policy: Any, parts: Parts) -> Episodes:
@@ -33,6 +35,11 @@ def explore(cfg: DictConfig, policy: Any, parts: Parts) -> Episodes:
         unit_scale=True,
         disable=not sys.stderr.isatty(),
     )
+
+    def progress(done: int) -> None:
+        check()
+        bar.update(done - bar.n)
+
     with bar:
         return evaluate(
             partial(build.make_env, cfg, policy=policy),
@@ -41,20 +48,31 @@ def explore(cfg: DictConfig, policy: Any, parts: Parts) -> Episodes:
             indices=range(settings.first, settings.first + settings.arenas),
             steps=settings.steps,
             batch=settings.batch,
-            progress=lambda done: bar.update(done - bar.n),
+            progress=progress,
             parts=parts,
         )
+
+
+def why_not(name: str) -> str | None:
+    """Says why a setting of an evaluation cannot be changed on the way; None if it can."""
+    free = any(f"{name}.".startswith(f"{each}.") for each in _FREE)
+    return None if free else "what it measured until now was measured without"
 
 
 def run(cfg: DictConfig) -> float:
     """Evaluates ``cfg.policy``; returns the mean coverage at the end, for sweepers."""
     folder = run_folder(cfg)
-    if cfg.resume is not None and (folder / "summary.json").is_file():
-        raise ValueError(f"resume={cfg.resume} is finished: there is nothing left to do")
+    if cfg.resume is not None and (done := records.finished(folder)) is not None:
+        print(f"{folder}: finished, there is nothing left to do")
+        return done["result"]
+    cfg = configuration(cfg, folder, why_not)
+    asked = {records.setting(word) for word in records.began_with(folder)} | asked_for()
     build.prepare(cfg)
-    cfg = build.as_trained(cfg, asked_for())
-    say_world(cfg)
-    policy, about = build.make_policy(cfg, asked_for())
+    task = build.as_trained(cfg, asked)
+    say_world(task)
+    policy, about = build.make_policy(task, asked)
+    keep(cfg, folder)
+    cfg = task
     logger = build.make_logger(cfg, folder)
     failed = True
     try:
@@ -63,6 +81,7 @@ def run(cfg: DictConfig) -> float:
             log(cfg, policy, logger, folder, episodes, summary)
         failed = False
     finally:
+        saved()
         logger.close(failed)
     print(table(summary))
     print(f"\nresults: {folder}")
@@ -82,8 +101,7 @@ def report(
     }
     parts = Parts(folder / "parts", settings)
     episodes = explore(cfg, policy, parts)
-    words = [word for word in HydraConfig.get().overrides.task if not word.startswith("resume=")]
-    command = shlex.join(["forestrl", "eval", *words])
+    command = shlex.join(["forestrl", "eval", *records.began_with(folder)])
     meta = {**settings, "version": __version__, "command": command}
     paper = coverage_of(about["policy"], cfg.policy.get("variant"), cfg.env)
     summary = write_report(episodes, folder, title=about["policy"], meta=meta, paper=paper)

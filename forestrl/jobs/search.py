@@ -10,17 +10,20 @@ from hydra.utils import get_class, instantiate
 from omegaconf import DictConfig, OmegaConf
 from torch import nn
 
-from forestrl import build
-from forestrl.command import asked_for, typed
+from forestrl import build, records
+from forestrl.command import keep, typed
 from forestrl.evaluation.arenas import draw_arenas
 from forestrl.explorer.training.task import Arenas, Search, Task
+from forestrl.loggers.csv import METRICS_FILE, read_rows
 from forestrl.policies.files import POLICY_FILE, save_policy
 from forestrl.progress import Progress
+from forestrl.stopping import check, saved
 
 _OF_PPO = (
     *("total_frames", "episode_steps", "checkpoint_every", "eval.every", "eval.steps"),
     *("reward", "graph", "safety", "ablation", "env.num_envs", "env.max_steps"),
 )
+_FREE = ("logger", "threads", "debug", "device", "algo.generations")
 
 
 def is_search(cfg: DictConfig) -> bool:
@@ -28,24 +31,40 @@ def is_search(cfg: DictConfig) -> bool:
     return hasattr(get_class(cfg.algo["_target_"]), "run")
 
 
+def why_not(name: str) -> str | None:
+    """Says why a setting of a search cannot be changed on the way; None if it can."""
+    free = any(f"{name}.".startswith(f"{each}.") for each in _FREE)
+    return None if free else "what it found until now was found without"
+
+
 def run(cfg: DictConfig, folder: Path) -> float:
     """Searches to the end; returns the mean steps on the validation arenas, negated, for sweepers.
+
+    A search that goes on finds in its folder what it did before, and logs only what is new.
 
     Raises:
         ValueError: if a setting was asked for that only PPO reads.
     """
-    for name in asked_for():
+    for name in map(records.setting, records.began_with(folder)):
         if any(f"{name}.".startswith(f"{each}.") for each in _OF_PPO):
             raise ValueError(f"{name} is not read by this algo: it is for algo=ppo")
-    build.prepare(cfg)
     search: Search = instantiate(cfg.algo)
+    logged, seconds, steps = _logged(folder)
+    done = records.finished(folder)
+    if done is not None and logged >= search.total:
+        print(f"{folder}: finished, there is nothing left to do")
+        return done["result"]
+    build.prepare(cfg)
+    keep(cfg, folder)
     network = instantiate(cfg.model)
-    logger, steps, began, failed = build.make_logger(cfg, folder), float("nan"), time.time(), True
+    logger, failed = build.make_logger(cfg, folder, logged), True
+    began = time.monotonic() - seconds
     try:
         with Progress(search.total, unit=search.unit) as bar:
             for told in search.run(network, make_task(cfg), folder):
-                if told.metrics:
-                    metrics = told.metrics | {"time/seconds": time.time() - began}
+                check()
+                if told.metrics and (told.done > logged or not logged):
+                    metrics = told.metrics | {"time/seconds": time.monotonic() - began}
                     logger.log_metrics(metrics, step=told.done)
                     steps = metrics.get("eval/steps", steps)
                 bar.update(told.done, told.metrics)
@@ -53,10 +72,25 @@ def run(cfg: DictConfig, folder: Path) -> float:
                     save(cfg, told.network, told.done, folder / "checkpoints" / "best", logger)
         failed = False
     finally:
+        saved()
         logger.close(failed)
     print(f"  steps  {steps:.1f} on the validation arenas, of the last that was measured")
     print(f"\nnext: forestrl eval {typed('checkpoint', folder)}")
     return -steps
+
+
+def _logged(folder: Path) -> tuple[int, float, float]:
+    """How much of a search was logged before, the seconds it took, and the last steps measured."""
+    if not (folder / METRICS_FILE).is_file():
+        return 0, 0.0, float("nan")
+    _, rows, _ = read_rows(folder / METRICS_FILE)
+    looks = [float(row["eval/steps"]) for row in rows if row.get("eval/steps")]
+    last = rows[-1] if rows else {}
+    return (
+        int(last.get("frames", 0)),
+        float(last.get("time/seconds") or 0),
+        looks[-1] if looks else float("nan"),
+    )
 
 
 def make_task(cfg: DictConfig) -> Task:

@@ -98,13 +98,20 @@ class PPO:
 
         Returns:
             the mean over all minibatches of each part of the loss and of its diagnostics.
+
+        Raises:
+            NotFiniteError: if a reward, a value, a part of the loss, the gradient or a weight is
+                infinite or no number; the networks are no longer of use then.
         """
         self.estimate_advantage(batch)
+        _require_finite({name: batch[key].abs().max() for name, key in _CHECKED.items()}, batch)
         frames = batch.select(*self.learns_from).reshape(-1)
         # One order too many is drawn: it is what earlier runs with the same seed did.
         *orders, _ = [torch.randperm(len(frames)) for _ in range(self.num_epochs + 1)]
         minibatches = (each for o in orders for each in frames[o].split(self.minibatch_size))
         measured = [self.step(minibatch) for minibatch in minibatches]
+        weights = torch.stack([weight.detach().abs().max() for weight in self.parameters]).max()
+        _require_finite({"weights": weights}, batch)
         means = torch.stack(measured).mean(0).tolist()
         metrics = dict(zip(_MEASURED.values(), means, strict=True))
         return metrics | {"ppo/explained_variance": explained_variance(batch)}
@@ -135,10 +142,12 @@ class PPO:
         losses.setdefault("loss_critic", losses["loss_objective"].new_zeros(()))  # if it weighs 0
         self.optimizer.zero_grad()
         (losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"]).backward()
-        norm = nn.utils.clip_grad_norm_(self.parameters, self.max_grad_norm)
+        losses["grad_norm"] = nn.utils.clip_grad_norm_(self.parameters, self.max_grad_norm)
+        measured = torch.stack([losses[key].detach() for key in _MEASURED])
+        if not measured.isfinite().all():
+            _require_finite(dict(zip(_MEASURED.values(), measured, strict=True)), minibatch)
         self.optimizer.step()
-        losses["grad_norm"] = norm
-        return torch.stack([losses[key].detach() for key in _MEASURED])
+        return measured
 
 
 _MEASURED = {
@@ -149,6 +158,31 @@ _MEASURED = {
     "clip_fraction": "ppo/clip_fraction",
     "grad_norm": "ppo/grad_norm",
 }
+
+
+_CHECKED = {
+    "reward": ("next", "reward"),
+    "the critic's value": "state_value",
+    "the advantage": "advantage",
+}
+
+
+class NotFiniteError(ValueError):
+    """A number that is infinite or none at all.
+
+    Attributes:
+        batch: in which it appeared.
+    """
+
+    def __init__(self, message: str, batch: TensorDictBase) -> None:
+        super().__init__(message)
+        self.batch = batch
+
+
+def _require_finite(values: dict[str, Tensor], batch: TensorDictBase) -> None:
+    for name, value in values.items():
+        if not value.isfinite():
+            raise NotFiniteError(f"{name} is {float(value)}", batch)
 
 
 def explained_variance(batch: TensorDictBase) -> float:

@@ -79,10 +79,11 @@ def test_damaged_training_file_is_refused(run):
     assert str(path) in line and "damaged" in line
 
 
-def test_missing_training_file_is_refused(run):
+def test_a_run_without_a_checkpoint_begins_anew(run):
+    before = rows(run / "metrics.csv")
     (run / "checkpoints/latest" / TRAINING_FILE).unlink()
-    line = refusal(run)
-    assert f"resume={run / 'checkpoints/latest'}" in line and TRAINING_FILE in line
+    assert forestrl("train", f"resume={run}").status == 0
+    assert rows(run / "metrics.csv") == before
 
 
 @pytest.mark.parametrize(

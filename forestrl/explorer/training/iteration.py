@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import shutil
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -12,12 +10,12 @@ from typing import Annotated
 import numpy as np
 import torch
 
+from forestrl.arrays import load_arrays, save_arrays
 from forestrl.explorer.network import LinearScore, ViewpointGATv2
 from forestrl.explorer.training.improvement import Fit, improve, normalize
 from forestrl.explorer.training.outcomes import Outcomes, gather
 from forestrl.explorer.training.task import LIMIT, Task, Told
 from forestrl.settings import Range, checked
-from forestrl.storage import atomic_write
 
 _CHUNK = 100  # arenas that are kept as one file
 Count = Annotated[int, Range(1, 1_000_000)]
@@ -111,11 +109,9 @@ class PolicyIteration:
         self, path: Path, network: ViewpointGATv2, task: Task, number: int, part: int
     ) -> Outcomes:
         """Gathers the outcomes of a hundred arenas, or finds them where they are kept."""
-        try:
-            with np.load(path, allow_pickle=False) as kept:
-                return Outcomes(*(kept[name] for name in Outcomes._fields))
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
-            pass
+        kept = load_arrays(path, Outcomes._fields)
+        if kept is not None:
+            return Outcomes(**kept)
         arenas, generator = task.draw(_CHUNK, number, part)
         outcomes = gather(
             *arenas,
@@ -127,8 +123,6 @@ class PolicyIteration:
             options=self.options,
             limit=LIMIT,
         )
-        data = io.BytesIO()
-        np.savez_compressed(data, **outcomes._asdict())
         path.parent.mkdir(exist_ok=True)
-        atomic_write(path, data.getvalue())
+        save_arrays(path, outcomes._asdict())
         return outcomes
