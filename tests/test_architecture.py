@@ -32,6 +32,7 @@ ROOMS = {  # room: the other rooms it may import from
     "planner": L0 | L1 | L2 | {"released"},
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
+    "gymnasium": {"envs", "functional", "keys", "rendering", "settings"},
     "benchmark": L0 | L1 | L2 | {"explorer", "planner"},
     "tables": {"statistics"},
     "sweeps": {"evaluation", "statistics", "storage", "tables"},
