@@ -7,8 +7,8 @@ Importing this module registers it, and imports nothing slow::
 
     env = gymnasium.make("ForestRL/Exploration-v0")
 
-``gymnasium.make("forestrl.gymnasium:ForestRL/Exploration-v0")`` needs no second import. The settings
-are those of :class:`forestrl.gymnasium.exploration.Exploration`.
+``gymnasium.make("forestrl.gymnasium:ForestRL/Exploration-v0")`` needs no second import. The
+settings are those of :class:`forestrl.gymnasium.exploration.Exploration`.
 """
 
 import gymnasium

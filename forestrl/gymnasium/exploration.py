@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
@@ -67,7 +67,7 @@ class Exploration(gymnasium.Env[Observation, np.int64]):
         >>> observation, reward, terminated, truncated, info = env.step(action)
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 - Gymnasium's type
 
     @checked
     def __init__(
@@ -134,7 +134,7 @@ class Exploration(gymnasium.Env[Observation, np.int64]):
         return self._observation(), float(after["reward"]), *ends, self._info()
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Tells which actions are feasible on the robot's map, bool ``[9]``, as MaskablePPO asks."""
+        """Tells which actions are feasible on the robot's map, bool ``[9]``, to MaskablePPO."""
         state = self._current()
         return F.feasible(state[K.CELLS], state[K.POSITION]).numpy()
 
@@ -173,7 +173,7 @@ class Exploration(gymnasium.Env[Observation, np.int64]):
         }
 
 
-def _observation_space(forest: ForestEnv, graph: ExplorationGraph) -> spaces.Dict:
+def _observation_space(forest: ForestEnv, graph: ExplorationGraph) -> spaces.Space[Any]:
     """Vectors all, as Stable-Baselines3 takes only images and vectors."""
     room = graph.max_frontiers
     unit = graph.lidar_range or forest.lidar_range

@@ -97,7 +97,7 @@ def test_envs_without_a_seed_differ():
 
 def test_the_observation_is_the_padded_graph_of_the_map():
     env = make()
-    for observation in episodes(env, 0)[0:1] + [env.reset(seed=5)[0]]:
+    for observation in (episodes(env, 0)[0], env.reset(seed=5)[0]):
         nodes = observation["nodes"].reshape(-1, 8)
         there = nodes.any(-1)
         assert there[:9].all() and np.array_equal(there[9:], observation["waypoint"] > 0)
@@ -200,8 +200,8 @@ def test_a_copy_goes_on_like_the_original(twin):
 
 @pytest.mark.parametrize(
     "start",
-    [None, pytest.param("fork", marks=pytest.mark.slow), pytest.param("spawn", marks=pytest.mark.slow)],
-)  # fmt: skip
+    [None, *(pytest.param(start, marks=pytest.mark.slow) for start in ("fork", "spawn"))],
+)
 def test_vectors_of_envs_do_as_each_env_alone(start):
     """In one process, and in several that were forked or spawned."""
     makers = [lambda: RecordEpisodeStatistics(make(max_steps=5))] * 2

@@ -49,13 +49,11 @@ def test_every_example_is_run():
     ],
 )
 def test_an_example_trains(name, library, tmp_path, monkeypatch):
-    """Two updates do more than one: both from the same seed, all weights finite."""
+    """The weights move away from those that the same seed starts with, and stay finite."""
     pytest.importorskip(library)
-    one, two = (trained(name, steps, tmp_path, monkeypatch) for steps in (STEPS // 2, STEPS))
-    assert all(weight.isfinite().all() for weight in two)
-    assert not all(map(torch.equal, one, two))
-    again = trained(name, STEPS, tmp_path, monkeypatch)
-    assert all(map(torch.equal, two, again))
+    before, after = (trained(name, steps, tmp_path, monkeypatch) for steps in (0, STEPS))
+    assert all(weight.isfinite().all() for weight in after)
+    assert not any(map(torch.equal, before, after))
 
 
 @pytest.mark.slow
