@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from torch import nn
 
@@ -41,7 +41,7 @@ def learned_policy(
     checkpoint: str | Path | None = None,
     deterministic: bool | None = None,
     *,
-    released: str = "explorer",
+    released: Literal["explorer", "linear", "paper"] = "explorer",
     models: Mapping[str, Callable[..., nn.Module]] = MODELS,
     settings: Mapping[str, Any] | None = None,
 ) -> Any:

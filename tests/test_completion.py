@@ -45,7 +45,7 @@ def completed(line, home):
         ("forestrl ", ["train", "eval", "render", "figures", "bench", "collisions"]),
         ("forestrl re", ["render"]),
         ("forestrl train env.s", ["env.seed=", "env.size="]),
-        ("forestrl eval policy=in", ["information_gain"]),
+        ("forestrl eval policy=in", ["information_gain", "information_gain_tuned"]),
         ("forestrl eval policy=random policy.f", ["policy.feasible_only="]),
         ("forestrl nonsense env.s", []),
     ],

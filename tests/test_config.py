@@ -25,7 +25,8 @@ OPTIONS = sorted(
     for path in CONF.glob("*/*.yaml")
     if path.parent.name not in ("experiment", "ablation")
 )
-EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
+SEARCHES = {"explorer", "linear"}
+EXPERIMENTS = sorted({path.stem for path in (CONF / "experiment").glob("*.yaml")} - SEARCHES)
 ABLATIONS = {  # what each changes
     "none": {},
     "no_filter": {"safety._target_": None},
@@ -54,8 +55,17 @@ SWEEPS = {
 }
 EXEMPT = {"num_envs", "seed", "device", "world"}
 GIVEN = {"run", "models", "settings"}  # by the assembler
+REQUIRED = {"start"}  # no default in Python
 SHORT = {"size", "n_trees", "tree_radius"}  # env's names for the settings of its world
-VARIANTS = {("env", "tiny"), ("env", "forest75"), ("env", "forest100"), ("reward", "coverage")}
+VARIANTS = {
+    ("env", "tiny"),
+    ("env", "forest75"),
+    ("env", "forest100"),
+    ("reward", "coverage"),
+    ("policy", "information_gain_tuned"),
+    ("policy", "linear"),
+    ("policy", "paper"),
+}
 TWO_TINY_BATCHES = (
     "env.size=14",
     "env.n_trees=4",
@@ -114,7 +124,7 @@ def test_every_option_can_be_constructed(group, option, tmp_path):
             instantiate(node, Run(tmp_path))
     elif group == "algo":
         networks = GATv2ActorCritic()
-        instantiate(node, networks.make_actor(), networks.make_critic())
+        instantiate(node, *([networks.make_actor(), networks.make_critic()] * (option == "ppo")))
     else:
         instantiate({key: value for key, value in node.items() if key != "name"})
 
@@ -135,7 +145,7 @@ def defaults_of(node):
 def test_keys_are_the_constructors_arguments(group, option):
     node = node_of(group, option)
     short = SHORT if group == "env" else set()
-    assert node.keys() - {"_target_", "name"} - short == defaults_of(node).keys()
+    assert node.keys() - {"_target_", "name"} - short - REQUIRED == defaults_of(node).keys()
 
 
 def test_the_worlds_settings_go_by_short_names():

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from forestrl import keys as K
-from forestrl.planners import NearestFrontier
+from forestrl.explorer import LinearScore
 from tests.envs.worlds import make_transformed
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -87,7 +87,8 @@ def test_the_table_of_keys_is_that_of_the_specs():
     """Key, shape and dtype of every row, for those that an env or a planner writes."""
     env = make_transformed(size=(9, 12), num_envs=2)
     state = (
-        NearestFrontier()(env.reset())
+        LinearScore(lidar_range=3.0)
+        .make_policy()(env.reset())
         .set(K.UNIFORM, torch.rand(2))
         .set(K.ACTION, torch.zeros(2).long())
     )

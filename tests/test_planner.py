@@ -10,12 +10,12 @@ from forestrl.planner import Planner
 from forestrl.planners import CostBased, InformationGain, NearestFrontier
 from forestrl.policies.actor_critic import LearnedPolicy
 from forestrl.policies.files import (
-    RELEASED,
     CheckpointError,
     Described,
     load_policy,
     save_policy,
 )
+from forestrl.released import MODELS, RELEASED
 from forestrl.status import Status
 from tests.drawing import situation
 from tests.envs.worlds import make_forest, make_transformed
@@ -39,8 +39,8 @@ def follow(env, planner, policy, steps):
 
 def test_a_learned_policy_decides_as_in_the_env():
     env = make_transformed(size=15, n_trees=10, lidar_range=3.0)
-    policy = load_policy(RELEASED).build(lidar_range=3.0)
-    planner = Planner.from_file(lidar_range=3.0, deterministic=True)
+    policy = load_policy(RELEASED["paper"]).build(MODELS, lidar_range=3.0)
+    planner = Planner.from_file(RELEASED["paper"], lidar_range=3.0, deterministic=True)
     env.transform[1].max_frontiers = planner.observe.max_frontiers
     done = list(follow(env, planner, policy.make_policy(deterministic=True), 25))
     assert len({decision.action for decision, _ in done}) > 2
@@ -89,7 +89,7 @@ def test_a_cell_outside_the_map_is_refused(position):
 
 
 def test_an_observation_that_is_not_known_is_refused(tmp_path):
-    policy = load_policy(RELEASED)
+    policy = load_policy(RELEASED["paper"])
     settings = vars(policy) | {"observation": Described("mine.Observation", {})}
     save_policy(tmp_path / "x", type(policy)(**settings))
     with pytest.raises(CheckpointError, match=r"reads 'mine.Observation', which is not one of"):
@@ -99,7 +99,7 @@ def test_an_observation_that_is_not_known_is_refused(tmp_path):
 def test_the_parts_that_a_planner_is_made_of_are_those_of_the_env():
     """An own observation and a policy of one's own, without any file."""
     observe = ExplorationGraph(lidar_range=5.0)
-    policy = load_policy(RELEASED).build().make_policy(True)
+    policy = load_policy(RELEASED["paper"]).build(MODELS).make_policy(True)
     cells, position = situation(". . ?\n. A ?\n. . .")
     decision = Planner(policy, observe).decide(cells, position.tolist())
     graph = F.exploration_graph(cells, position, window=7, max_frontiers=256, lidar_range=5.0)

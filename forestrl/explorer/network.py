@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import torch
@@ -24,7 +23,9 @@ class LinearScore(nn.Module):
     Args:
         lidar_range: sensor range ``l``, cells; the env's.
         coverage_goal: the coverage to be reached; the env's. Not looked at.
-        weights: of the :data:`TERMS`, until others are loaded.
+
+    Attributes:
+        weights: of the :data:`TERMS`, ``[14]``; at first those of path gain.
     """
 
     adjustable = ("lidar_range", "coverage_goal")
@@ -36,11 +37,10 @@ class LinearScore(nn.Module):
         self,
         lidar_range: Annotated[float, Range(1.415, 100)] = 5.0,
         coverage_goal: Annotated[float, Range(above=0, high=1)] = 0.98,
-        weights: Sequence[float] = PATH_GAIN,
     ) -> None:
         super().__init__()
         self.lidar_range, self.coverage_goal = lidar_range, coverage_goal
-        self.register_buffer("weights", torch.tensor(list(weights), dtype=torch.float64))
+        self.register_buffer("weights", torch.tensor(PATH_GAIN, dtype=torch.float64))
 
     def pack(self) -> Weights:
         """Gives the weights as the compiled code takes them."""
@@ -122,14 +122,15 @@ class ViewpointGATv2(nn.Module):
 
         Args:
             features: float64 ``[B, M, F]``.
-            places: row and column, in units of twice the sensor's range, ``[B, M, 2]``.
+            places: row and column, cells, ``[B, M, 2]``.
             there: which of them there are, bool ``[B, M]``.
 
         Returns:
             the scores, ``[B, M]``.
         """
         nodes = ((features - self.mean) / self.scale).float()
-        distance = (places.unsqueeze(1) - places.unsqueeze(2)).abs().amax(-1).float()
+        away = (places.unsqueeze(1) - places.unsqueeze(2)).abs().amax(-1)
+        distance = away.float() / (2 * self.lidar_range)  # whole cells first: 0.6 is exact
         edges = torch.stack((distance, (-2 * distance).exp(), (distance < 0.6).float()), -1)
         x = self.embed(nodes).relu()
         for layer in self.layers:

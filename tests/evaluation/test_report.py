@@ -53,6 +53,7 @@ def test_rows_of_the_table_of_episodes(tmp_path):
         "null_actions": "3",
         "collisions": "3",
         "path_length": "10",
+        "guarded": "0",
         "ending": "covered",
     }
     assert second["steps_to_80"] == "" and second["path_length"] == "20.5"

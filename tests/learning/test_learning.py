@@ -5,7 +5,7 @@ import pytest
 from forestrl import build
 from forestrl.evaluation import evaluate
 from forestrl.planners import RandomWalk
-from forestrl.policies.files import load_policy
+from forestrl.released import learned_policy
 from tests.commands import compose, train
 
 ARENA = ("env.size=10", "env.n_trees=0", "env.lidar_range=2.0")
@@ -38,5 +38,5 @@ def test_a_short_training_beats_the_random_walk(tmp_path):
         "algo.num_epochs=4",
         "algo.lr=1e-3",
     )
-    learned = load_policy(run).build().make_policy()
+    learned = learned_policy(run)
     assert coverage(learned) > coverage(RandomWalk()) + MARGIN

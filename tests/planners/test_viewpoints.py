@@ -87,7 +87,7 @@ def test_linear_score_goes_where_its_loop_is_highest(seed, lidar_range):
     weights, heading = rng.normal(size=14), rng.normal(size=2) * (seed % 3 > 0)
     last = (int(rng.integers(len(cells))), int(rng.integers(len(cells[0])))) if seed % 5 else None
     td = TensorDict({K.CELLS: cells, K.POSITION: position})
-    policy = LinearScore(lidar_range, weights=weights.tolist()).make_policy()
+    policy = linear(weights, lidar_range).make_policy()
     td = remembering(policy, td, heading, last, lidar_range)
     td = policy(td)
     if not paths.goals():
@@ -119,12 +119,16 @@ def remembering(policy, td, heading, last, lidar_range):
     return td
 
 
+def linear(weights, lidar_range=5.0):
+    score = LinearScore(lidar_range)
+    score.weights.copy_(torch.as_tensor(weights))
+    return score
+
+
 POLICIES = {
     "path gain": PathGain,
     "linear": lambda: LinearScore().make_policy(),
-    "wavering": lambda: LinearScore(
-        weights=[-3.0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0, -9, 0, 0]
-    ).make_policy(),
+    "wavering": lambda: linear([-3.0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0, -9, 0, 0]).make_policy(),
 }
 ROOMS = """
     A . . . . . . . T . . .

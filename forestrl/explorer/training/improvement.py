@@ -70,9 +70,8 @@ def improve(
 ) -> ViewpointGATv2:
     """Fits a copy of the network to outcomes of the policy before."""
     network = copy.deepcopy(network).train()
-    reach = 2 * network.lidar_range
     features, there = torch.from_numpy(outcomes.features), torch.from_numpy(outcomes.there)
-    places = torch.from_numpy(outcomes.places) / reach
+    places = torch.from_numpy(outcomes.places)
     before, steps = torch.from_numpy(outcomes.scores), torch.from_numpy(outcomes.steps)
     optimizer = torch.optim.AdamW(network.parameters(), lr=fit.lr, weight_decay=fit.weight_decay)
     for _ in range(fit.epochs):

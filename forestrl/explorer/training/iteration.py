@@ -53,8 +53,8 @@ class PolicyIteration:
     def __init__(
         self,
         start: LinearScore,
-        rounds: Annotated[int, Range(1, 100)] = 2,
-        arenas: Annotated[int, Range(100, 10_000_000)] = 2500,
+        rounds: Annotated[int, Range(1, 100)] = 3,
+        arenas: Annotated[int, Range(100, 10_000_000)] = 500,
         rate: Annotated[float, Range(above=0, high=1)] = 0.03,
         options: Annotated[int, Range(2, 64)] = 5,
         epochs: Count = 8,
@@ -71,7 +71,7 @@ class PolicyIteration:
         self.total = rounds * arenas
 
     def run(self, network: ViewpointGATv2, task: Task, folder: Path) -> Iterator[Told]:
-        """Trains; see :class:`Search`.
+        """Trains; what is kept in the folder lets an interrupted training go on.
 
         Raises:
             ValueError: if the network compares no viewpoints.

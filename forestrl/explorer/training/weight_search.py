@@ -50,7 +50,7 @@ class WeightSearch:
         self.spread, self.validate_every = spread, validate_every
 
     def run(self, network: LinearScore, task: Task, folder: Path) -> Iterator[Told]:
-        """Searches from the network's weights on; see :class:`Search`.
+        """Searches from the network's weights on, or goes on with what the folder keeps.
 
         Raises:
             ModuleNotFoundError: if the library that searches is not installed.
