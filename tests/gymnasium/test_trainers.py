@@ -14,16 +14,11 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 2048
 
 
-def policies(agent):
-    """The networks of a trained agent, whatever the library calls them."""
-    return [agent.policy] if hasattr(agent, "get_parameters") else [*agent.models.values()]
-
-
 def trained(name, steps, folder, monkeypatch):
     """The weights after a training of an example."""
-    monkeypatch.chdir(folder)  # skrl leaves its logs where it runs
+    monkeypatch.chdir(folder)
     agent = runpy.run_path(str(EXAMPLES / f"{name}.py"))["train"](steps)
-    return [p.detach().clone() for network in policies(agent) for p in network.parameters()]
+    return [p.detach().clone() for p in agent.policy.parameters()]
 
 
 def test_stable_baselines3s_checker_has_nothing_to_say():
@@ -36,7 +31,7 @@ def test_stable_baselines3s_checker_has_nothing_to_say():
 
 def test_every_example_is_run():
     names = {path.stem for path in EXAMPLES.glob("*_ppo.py")}
-    assert names == {"stable_baselines3_ppo", "maskable_ppo", "skrl_ppo"}
+    assert names == {"stable_baselines3_ppo", "maskable_ppo"}
 
 
 @pytest.mark.slow
@@ -45,7 +40,6 @@ def test_every_example_is_run():
     [
         ("stable_baselines3_ppo", "stable_baselines3"),
         ("maskable_ppo", "sb3_contrib"),
-        ("skrl_ppo", "skrl"),
     ],
 )
 def test_an_example_trains(name, library, tmp_path, monkeypatch):
