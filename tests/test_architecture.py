@@ -45,6 +45,7 @@ ROOMS = {  # room: the other rooms it may import from
     "rendering": L0 | L1 | {"envs"},
     "evaluation": L0 | L1 | {"envs", "rendering"},
     "pages": L0 | L1 | {"", "rendering"},
+    "gymnasium": {"envs", "functional", "keys", "rendering", "settings"},
     "benchmark": L0 | L1 | L2 | {"explorer", "planner"},
     "tables": {"statistics"},
     "sweeps": {"evaluation", "statistics", "storage", "tables"},

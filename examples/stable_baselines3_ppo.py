@@ -1,0 +1,29 @@
+"""Trains Stable-Baselines3's PPO on small forests: ``python examples/stable_baselines3_ppo.py``."""
+
+import gymnasium
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_util import make_vec_env
+
+import forestrl.gymnasium
+from forestrl.envs import RandomForest
+
+
+def make() -> gymnasium.Env:
+    """One env: small forests, and a graph of a size for them."""
+    return gymnasium.make(
+        forestrl.gymnasium.ID,
+        world=RandomForest(20, n_trees=6),
+        graph={"max_frontiers": 64},
+        max_steps=300,
+    )
+
+
+def train(steps: int = 200_000) -> PPO:
+    """Trains in four envs at once."""
+    env = make_vec_env(make, n_envs=4, seed=0)
+    model = PPO("MultiInputPolicy", env, n_steps=256, gamma=0.99, seed=0, device="cpu")
+    return model.learn(steps)
+
+
+if __name__ == "__main__":
+    train().save("stable_baselines3_ppo")
