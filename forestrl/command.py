@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shlex
 import sys
 import traceback
@@ -15,21 +14,18 @@ from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import HydraException, InstantiationException
 from hydra.types import RunMode
 from hydra.utils import to_absolute_path
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 
 from forestrl import records, runs
 from forestrl.command_line import prepare_words, typed
-from forestrl.config import CONF_DIR, check_all, followed, kinds_of, leaves
+from forestrl.config import CONF_DIR, check_all, kinds_of, leaves
+from forestrl.errors import USER_ERRORS, describe, with_whole_names
 from forestrl.settings import is_path
 from forestrl.stopping import Stopped, saved, stopping
 from forestrl.terminal import lasting_output
-from forestrl.wording import nearest
 
-_USER_ERRORS = (ValueError, OSError, HydraException, OmegaConfBaseException)
 _FULL_ERROR = os.environ.get("HYDRA_FULL_ERROR") == "1"  # as the user set it; main() sets it too
 
 Job = Callable[[DictConfig], Any]
@@ -105,8 +101,8 @@ def _in_one_line(name: str, job: Job) -> Job:
                 stopped.how_to_go_on = f"forestrl {name} {typed('resume', run_folder(cfg))}"
             raise
         except Exception as error:
-            user_error = isinstance(error, _USER_ERRORS) and not _debug()
-            text = _with_whole_names(describe(error), cfg)
+            user_error = isinstance(error, USER_ERRORS) and not _debug()
+            text = with_whole_names(describe(error), cfg)
             if _is_swept():
                 _note(text if user_error else "".join(traceback.format_exception(error)))
             if not user_error:
@@ -153,7 +149,7 @@ def _run(name: str, entry: Callable[[], Any]) -> Any:
         _fail(name, describe(refusal.__cause__ or refusal))
     except Exception as error:
         failed = _failed_jobs(runs.sweep_folder())
-        if _debug() or not (failed or isinstance(error, _USER_ERRORS)):
+        if _debug() or not (failed or isinstance(error, USER_ERRORS)):
             raise
         _fail(name, *(failed or [describe(error)]))
     finally:
@@ -237,38 +233,3 @@ def _fail(name: str, *reasons: str) -> None:
     for reason in reasons:
         print(f"forestrl {name}: {reason}", file=sys.stderr)
     sys.exit(1)
-
-
-def describe(error: BaseException) -> str:
-    """Puts an error into one line, from its first cause."""
-    made = ""
-    while isinstance(error, InstantiationException) and error.__cause__ is not None:
-        target = re.search(r"target '([\w.]+)'", str(error))
-        node = re.search(r"full_key: ([\w.]+)", str(error))
-        made = (f"{node[1]}: " if node else "") + target[1] if target else made
-        error = error.__cause__
-    text = " ".join(str(error).split()).partition(" Config search path:")[0]
-    if unknown := re.search(r"Could not override '([^']+)'", text):
-        return f"there is no setting {unknown[1]}{_meant(unknown[1], error.__cause__)}"
-    if text.startswith("Error merging override") and error.__cause__ is not None:
-        return f"{text}: {str(error.__cause__).splitlines()[0]}"
-    if made and not isinstance(error, _USER_ERRORS):
-        return f"{made} cannot be made: {type(error).__name__}: {text}; debug=true shows where"
-    return text
-
-
-def _with_whole_names(text: str, cfg: DictConfig) -> str:
-    """Writes ``env.size=2`` for the ``shape=2`` of a class that knows no other name for it."""
-    names: dict[str, set[str]] = {}
-    for name, raw in leaves(cfg).items():
-        names.setdefault(name.rpartition(".")[2], set()).add(followed(raw) or name)
-    whole = {last: next(iter(found)) for last, found in names.items() if len(found) == 1}
-    return re.sub(r"(?<![\w./])(\w+)(?==)", lambda match: whole.get(match[1], match[1]), text)
-
-
-def _meant(name: str, cause: BaseException | None) -> str:
-    """Says which setting of the same configuration was probably meant."""
-    node = getattr(cause, "parent_node", None)
-    if node is None:
-        return ""
-    return nearest(name, leaves(node._get_root()))

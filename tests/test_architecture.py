@@ -55,7 +55,8 @@ ROOMS = {  # room: the other rooms it may import from
     "records": {"settings", "storage"},
     "runs": {"records", "storage"},
     "command_line": {"config", "help", "records", "runs"},
-    "command": {"command_line", "config", "records", "runs", "settings", "stopping"}
+    "errors": {"config", "wording"},
+    "command": {"command_line", "config", "errors", "records", "runs", "settings", "stopping"}
     | {"terminal", "wording"},
     "shared": {"config", "settings"},
     "loggers": {"settings", "storage"},

@@ -196,17 +196,12 @@ class _Record:
 
     def __init__(self, td: TensorDictBase, steps: int) -> None:
         n, device = td.batch_size[0], td.device
+        names = ("collisions", "straight", "diagonal", "null_actions", "truncated", "guarded")
         self.coverage = torch.zeros(steps + 1, n, device=device)
         self.coverage[0] = td[K.COVERAGE].squeeze(-1)
         self.intervened = torch.zeros(steps, n, dtype=torch.bool, device=device)
         self.counts = TensorDict(
-            {
-                name: torch.zeros(n, dtype=torch.int32, device=device)
-                for name in (
-                    *("collisions", "straight", "diagonal"),
-                    *("null_actions", "truncated", "guarded"),
-                )
-            }
+            {name: torch.zeros(n, dtype=torch.int32, device=device) for name in names}
         )
 
     def add(self, step: int, td: TensorDictBase) -> None:

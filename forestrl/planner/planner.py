@@ -66,9 +66,8 @@ class Planner:
         ValueError: if a setting is not allowed.
 
     Examples:
-        >>> grid = {"width": 3, "height": 1, "resolution": 1.0, "origin": [0, 0]}
-        >>> planner = Planner("nearest_frontier", beyond_edge="wall")
-        >>> decision = planner.plan({**grid, "data": [0, 0, -1]}, (0.5, 0.5))
+        >>> data = {"width": 3, "height": 1, "resolution": 1.0, "origin": [0, 0], "data": [0, 0, -1]}
+        >>> decision = Planner("nearest_frontier", beyond_edge="wall").plan(data, (0.5, 0.5))
         >>> decision.status.value, decision.waypoint
         ('exploring', (1.5, 0.5))
     """
@@ -215,8 +214,8 @@ class Planner:
     def _decided(self, cells: CellPlanner, here: Situation, now: float) -> Decision:
         """Decides, unless the robot has not yet done what was decided last."""
         past = self._past
-        key = hashlib.blake2b(here.cells.tobytes() + repr((here.layout, here.place)).encode())
-        digest = key.hexdigest()
+        situation = here.cells.tobytes() + repr((here.layout, here.place)).encode()
+        digest = hashlib.blake2b(situation).hexdigest()
         if past.last is not None and past.last[0] == digest and past.last[1].action:
             return past.last[1]
         if GRID in getattr(cells.policy, "out_keys", ()):
@@ -247,6 +246,6 @@ class Planner:
         elif self._stuck_after is not None and waited >= self._stuck_after:
             past.spot = at, now
             self.reject(time=now)
-            reason = f"the robot has not left its spot for {waited:.0f} s: the goal is set aside"
-            return Decision(PlannerStatus.STUCK, reason)
+            why = f"the robot has not left its spot for {waited:.0f} s: the goal is set aside"
+            return Decision(PlannerStatus.STUCK, why)
         return decision
