@@ -168,3 +168,8 @@ def test_functional_modules_are_in_order(module):
         (row,) = (i for i, names in enumerate(FUNCTIONAL) if path.stem in names)
         allowed = set().union(*FUNCTIONAL[:row])
         assert {name.split(".")[2] for name in ours} <= allowed
+
+
+def test_no_file_is_long_but_the_passes_of_the_network():
+    long = {path.name for path in MODULES if path.read_text("utf-8").count("\n") > 250}
+    assert long == {"passes.py"}

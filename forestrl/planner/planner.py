@@ -66,8 +66,8 @@ class Planner:
         ValueError: if a setting is not allowed.
 
     Examples:
-        >>> data = {"width": 3, "height": 1, "resolution": 1.0, "origin": [0, 0], "data": [0, 0, -1]}
-        >>> decision = Planner("nearest_frontier", beyond_edge="wall").plan(data, (0.5, 0.5))
+        >>> row = {"width": 3, "height": 1, "resolution": 1.0, "origin": [0, 0], "data": [0, 0, -1]}
+        >>> decision = Planner("nearest_frontier", beyond_edge="wall").plan(row, (0.5, 0.5))
         >>> decision.status.value, decision.waypoint
         ('exploring', (1.5, 0.5))
     """
@@ -109,8 +109,7 @@ class Planner:
         self._make = policy_named(policy, deterministic) if isinstance(policy, str) else policy
         self._name = policy if isinstance(policy, str) else "a function"
         self._retry_after, self._stuck_after = retry_after, stuck_after
-        self._seed, self._clock = seed, clock
-        self._lock = RLock()
+        self._seed, self._clock, self._lock = seed, clock, RLock()
         self.start()
 
     @classmethod

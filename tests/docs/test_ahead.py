@@ -36,7 +36,7 @@ def row_of(setting, policy):
     cells = [setting, f"`{policy}`", str(len(steps)), with_margin(steps), f"{reached:.0%}"]
     cells += [f"{np.nanmax(steps):.0f}", with_margin(100 * area)]
     if policy == "learned":
-        return cells + ["", ""]
+        return [*cells, "", ""]
     both = (ours - steps)[~np.isnan(ours - steps)]
     return [*cells, with_margin(both), with_margin(100 * (our_area - area))]
 
