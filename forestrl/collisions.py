@@ -33,15 +33,15 @@ class Settings(WithPolicy):
 
     @staticmethod
     def check(cfg: DictConfig) -> None:
-        """Refuses another policy than the learned one, and another world than a forest."""
+        """Refuses another policy than the paper's, and another world than a forest."""
         require_forest(cfg)
-        if cfg.policy.name != "learned":
-            raise not_allowed("policy", cfg.policy.name, "the learned one is compared with random")
+        if cfg.policy.name != "paper":
+            raise not_allowed("policy", cfg.policy.name, "the paper's is compared with random")
 
 
 @command("collisions", Settings)
 def main(cfg: DictConfig) -> int:
-    """Runs a random and the learned policy over sizes and densities; returns the filter's failures.
+    """Runs a random and the paper's policy over sizes and densities; returns the filter's failures.
 
     The random policy draws among all nine actions. Without the filter both collide.
     """

@@ -17,7 +17,7 @@ def test_only_without_the_filter_there_are_collisions(tmp_path):
     assert result.status == 0, result.err
     table = rows(tmp_path / "collisions.csv")
     counted = {(row["policy"], row["filter"]): int(row["collisions"]) for row in table}
-    assert counted["random", "on"] == counted["learned", "on"] == 0
+    assert counted["random", "on"] == counted["paper", "on"] == 0
     assert counted["random", "off"] > 0
     assert {(row["size"], row["n_trees"], row["steps"]) for row in table} == {("14", "4", "240")}
     (line,) = (line for line in result.out.splitlines() if line.startswith("random   filter off"))

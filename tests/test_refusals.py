@@ -118,7 +118,8 @@ def test_every_job_of_a_sweep_is_refused_by_the_same_words(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     result = forestrl("train", "-m", "env.n_trees=-1,-2", "env=tiny")
     assert result.status == 1
-    assert re.search(r"env.n_trees=-1 is not allowed", result.err.splitlines()[-1])
+    assert re.search(r"env.n_trees=-2 is not allowed", result.err.splitlines()[-1])
+    assert "env.n_trees=-1 is not allowed" in result.err
 
 
 MINE = """

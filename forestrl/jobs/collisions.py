@@ -45,14 +45,14 @@ def count(cfg: DictConfig, policy: Any, forest: dict[str, int], filtered: bool) 
 
 
 def run(cfg: DictConfig) -> int:
-    """Runs a random and the learned policy over sizes and densities; returns the filter's failures.
+    """Runs a random and the paper's policy over sizes and densities; returns the filter's failures.
 
     The random policy draws among all nine actions. Without the filter both collide.
     """
     folder = run_folder(cfg)
     build.prepare(cfg)
-    learned, _ = build.make_policy(cfg, asked_for())
-    policies = {"random": RandomWalk(feasible_only=False), "learned": learned}
+    paper, _ = build.make_policy(cfg, asked_for())
+    policies = {"random": RandomWalk(feasible_only=False), "paper": paper}
     forests = [
         {"size": size, "n_trees": round(density * size**2 / 50**2)}
         for size, density in itertools.product(cfg.collisions.sizes, cfg.collisions.densities)

@@ -8,7 +8,7 @@ import torch
 
 from forestrl import kernels
 from tests.commands import forestrl
-from tests.test_docs import write_files
+from tests.docs.pages import blocks
 
 STEPS = ["env step", "+ filter", "+ graph", "+ reward", "policy forward"]
 LEARNING = ["GAE", "PPO minibatches", "train iteration"]
@@ -130,7 +130,11 @@ def test_another_network_no_filter_and_one_size_can_be_asked_for(tmp_path):
 
 @pytest.mark.slow
 def test_a_foreign_world_observation_and_network_are_measured(tmp_path, monkeypatch):
-    write_files("extend.md", tmp_path)
+    for block in blocks("docs/extend.md"):
+        if block.file:
+            (tmp_path / block.file).parent.mkdir(parents=True, exist_ok=True)
+            with (tmp_path / block.file).open("a") as file:
+                file.write(block.text)
     monkeypatch.syspath_prepend(tmp_path)
     ours = [f"{group}=mine" for group in ("env", "graph", "model", "reward")]
     rows, _ = bench(tmp_path, "--config-dir", tmp_path / "my_conf", *SHORT, *ours)

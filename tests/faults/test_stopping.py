@@ -28,6 +28,16 @@ def after_updates(monkeypatch, number, count):
     monkeypatch.setattr("forestrl.jobs.train.summarize", measured)
 
 
+@pytest.fixture(autouse=True)
+def heard():
+    """The signals as a terminal has them: a shell in the background would have some ignored."""
+    before = {number: signal.signal(number, signal.SIG_DFL) for number, _ in SENT}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     return train(tmp_path_factory.mktemp("whole"))
