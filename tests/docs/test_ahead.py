@@ -46,7 +46,7 @@ def folders():
 
 
 def test_every_row_is_that_of_its_files():
-    assert len(folders()) >= 9
+    assert len(folders()) >= 6
     for folder in folders():
         row = "| " + " | ".join(row_of(folder.parent.name, folder.name)) + " |"
         assert row.replace("|  |", "| |") in PAGE.replace("|  |", "| |"), row
@@ -57,8 +57,8 @@ def test_every_evaluation_is_safe_and_its_command_is_on_the_page():
         summary = json.loads((folder / "summary.json").read_text())
         measures = {each["measure"]: each["mean"] for each in summary["measures"]}
         assert measures["collisions"] == 0 and measures["intervention_rate"] < 0.001
-        command = summary["meta"]["command"].replace(f"policy={folder.name}", "policy=POLICY")
-        assert command.replace(" policy=POLICY", "") in PAGE.replace(" policy=POLICY", ""), command
+        command = summary["meta"]["command"].replace(f"policy={folder.name}", "policy=learned")
+        assert command in PAGE, command
 
 
 def test_the_learning_curves_are_those_of_the_trainings():
