@@ -15,7 +15,7 @@ from forestrl.storage import atomic_write, csv_text
 
 SIDES = {50: 200, 200: 100, 1000: 30}
 """Cells along a side, and how many decisions are timed."""
-POLICIES = ("nearest_frontier", "path_gain")
+POLICIES = ("nearest_frontier", "path_gain", "linear", "learned")
 HEAD = ("policy", "side", "decisions", "median_ms", "percentile_99_ms")
 
 

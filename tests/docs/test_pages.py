@@ -63,8 +63,17 @@ def test_a_command_is_allowed_as_it_is_typed(page, words):
     check_all(compose(name, *given), import_module(f"forestrl.{name}").Settings, asked)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in PAGES if is_run(page)])
+QUICK = ("docs/extend.md",)
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.slow if page in QUICK else pytest.mark.heavy)
+        for page in PAGES
+        if is_run(page)
+    ],
+)
 def test_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     """Its files are written, its commands and its Python run, in the order they stand in."""
     monkeypatch.chdir(tmp_path)

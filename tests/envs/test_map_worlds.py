@@ -235,6 +235,7 @@ def dungeon(kind):
     )
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("kind", ["easy", "medium", "complex"])
 @pytest.mark.parametrize("name", PLANNERS)
 def test_planners_explore_dungeons_without_a_collision(name, kind):

@@ -14,7 +14,7 @@ from forestrl.explorer.training.iteration import PolicyIteration
 from forestrl.explorer.training.outcomes import NOT_TRIED, gather
 from forestrl.explorer.training.task import Arenas, Task
 
-FOREST = RandomForest(16, 6, (0.8, 1.5))
+FOREST = RandomForest(12, 4, (0.8, 1.5))
 RANGE, GOAL = 3.0, 0.95
 
 
@@ -77,7 +77,7 @@ def outcomes(made, drawn, seeds, **options):
         lidar_range=RANGE,
         weights=made.pack(),
         coverage_goal=GOAL,
-        rate=0.3,
+        rate=0.4,
         options=3,
         **options,
     )
@@ -109,7 +109,7 @@ def test_outcomes_of_an_arena_do_not_depend_on_the_others():
 
 
 def test_policy_iteration_goes_on_where_it_stopped_and_keeps_what_is_better(tmp_path):
-    algo = PolicyIteration(LinearScore(RANGE, GOAL), rounds=2, arenas=200, rate=0.1, epochs=2)
+    algo = PolicyIteration(LinearScore(RANGE, GOAL), rounds=2, arenas=200, rate=0.03, epochs=2)
 
     def start():
         torch.manual_seed(0)

@@ -35,6 +35,7 @@ def test_every_example_is_run():
 
 
 @pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     ("name", "library"),
     [
@@ -51,6 +52,7 @@ def test_an_example_trains(name, library, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.heavy
 def test_maskable_ppo_without_a_filter_never_collides(tmp_path, monkeypatch):
     """The masks hold what the filter would have held."""
     pytest.importorskip("sb3_contrib")

@@ -45,7 +45,7 @@ def test_a_policy_is_shown_once(tmp_path):
     assert result.status == 1 and "each policy is drawn once" in result.err
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_long_episode_in_a_large_arena_stays_small(tmp_path):
     options = ("env.size=100", "env.n_trees=180", "show.steps=500", "show.beside=[paper]")
     shown(tmp_path, "policy=path_gain", *options)

@@ -45,8 +45,16 @@ def grid_of(cells):
     return shape | {"data": base64.b64encode(data.tobytes()).decode()}
 
 
-@pytest.mark.parametrize("name", ["path_gain", "nearest_frontier"])
-def test_another_process_closes_the_loop_on_100_arenas_as_the_env_does(name, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "arenas"),
+    [
+        ("path_gain", 5),
+        pytest.param("path_gain", 100, marks=pytest.mark.heavy),
+        pytest.param("nearest_frontier", 100, marks=pytest.mark.heavy),
+        pytest.param("learned", 100, marks=pytest.mark.heavy),
+    ],
+)
+def test_another_process_closes_the_loop_as_the_env_does(name, arenas, tmp_path):
     env = TransformedEnv(
         make_forest(size=14, n_trees=9, lidar_range=3.0, max_steps=80), Compose(SafetyFilter())
     )
@@ -54,7 +62,7 @@ def test_another_process_closes_the_loop_on_100_arenas_as_the_env_does(name, tmp
     process = start(f"planner.policy={name}", "planner.lidar_range=3", "planner.beyond_edge=wall")
     steps = 0
     with process:
-        for arena in range(100):
+        for arena in range(arenas):
             assert ask(process, type="start", id=arena) == {
                 "schema": 1,
                 "id": arena,
