@@ -15,7 +15,7 @@ def row(measure, value, margin=None, n=2):
 
 
 def write_evaluation(
-    root: Path, setting="nominal", name="learned", coverage=(0.9, 0.8), rate=0.1, endings=None
+    root: Path, setting="nominal", name="paper", coverage=(0.9, 0.8), rate=0.1, endings=None
 ):
     """An arena for each coverage, which holds from the first step on; under 10 % it is stuck."""
     folder = root / setting / name

@@ -17,7 +17,7 @@ def results(tmp_path):
     folder = tmp_path / "results"
     for setting in ("nominal", "trees75", "size75"):
         write_evaluation(folder, setting)
-    write_evaluation(folder, name="learned_seed1", coverage=(0.7, 0.6))
+    write_evaluation(folder, name="paper_seed1", coverage=(0.7, 0.6))
     write_evaluation(folder, name="cost_published", rate=0.0)
     write_training(folder / "training" / "seed0.csv")
     (folder / "training" / "seed0.yaml").write_text("- experiment=paper\n- seed=0\n")
@@ -68,14 +68,14 @@ def test_the_page_has_tables_figures_and_the_commands_behind_them(results):
     assert headings[0] == "## In a minute" and headings[-1] == "## Figures"
     assert "## What each part is good for" not in headings  # there are no ablations
     assert '<img src="figures/fig4a.png"' in text and "{" not in text.replace("/{", "")
-    assert f"forestrl eval policy=learned hydra.run.dir={results}/size75/learned\n" in text
+    assert f"forestrl eval policy=paper hydra.run.dir={results}/size75/paper\n" in text
     assert "forestrl train experiment=paper seed=0\n" in text
 
 
 def test_a_method_that_was_not_measured_is_refused_with_those_that_were(results):
     result = figures(results, "method=leaned", "readme=null")
     assert result.status == 1 and result.err.count("\n") == 1
-    assert f"method=leaned is not in {results}: it has cost_published, learned" in result.err
+    assert f"method=leaned is not in {results}: it has cost_published, paper" in result.err
 
 
 def write_sweep(folder, jobs):
@@ -99,7 +99,7 @@ def test_a_figure_without_data_is_skipped_with_what_it_wants(tmp_path):
     result = figures(tmp_path)
     assert result.status == 0
     assert f"fig3a skipped: it wants, in {tmp_path}, training/seed<N>.csv" in result.out
-    assert f"fig3b skipped: it wants, in {tmp_path}, nominal/learned/" in result.out
+    assert f"fig3b skipped: it wants, in {tmp_path}, nominal/paper/" in result.out
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {"fig4a.png", "fig4a.pdf"}
 
 
@@ -111,7 +111,7 @@ def broken(folder, file, old, new):
 @pytest.mark.parametrize(
     ("breakage", "message"),
     [
-        (lambda f: (f / "curve.csv").unlink(), "nominal/learned/curve.csv is missing"),
+        (lambda f: (f / "curve.csv").unlink(), "nominal/paper/curve.csv is missing"),
         (lambda f: (f / "summary.json").write_text("{"), "summary.json is not valid JSON"),
         (lambda f: (f / "summary.json").write_text("[]"), "summary.json lacks arenas"),
         (lambda f: (f / "episodes.csv").write_text(""), "episodes.csv cannot be read: No columns"),

@@ -58,7 +58,7 @@ def test_headline_sets_the_paper_beside_ours_and_marks_the_best(tmp_path):
 
 
 def test_the_short_table_has_the_policies_that_the_catalogue_names(tmp_path):
-    for name in ("learned", "learned_mode", "nearest_frontier", "random"):
+    for name in ("paper", "paper_mode", "nearest_frontier", "random"):
         write_evaluation(tmp_path, name=name)
     table = short(read_results(tmp_path))
     assert [line.split("|")[1].strip() for line in table.splitlines()[2:]] == [
@@ -69,7 +69,7 @@ def test_the_short_table_has_the_policies_that_the_catalogue_names(tmp_path):
 
 def test_a_method_of_several_seeds_has_a_row_over_seeds_and_one_of_its_checkpoint(tmp_path):
     for seed, share in enumerate((0.8, 0.9)):
-        name = f"learned_seed{seed}" if seed else "learned"
+        name = f"paper_seed{seed}" if seed else "paper"
         write_evaluation(tmp_path, name=name, coverage=(share, share))
     table = headline(read_results(tmp_path))
     method, checkpoint = cells(table, "GATv2 and PPO"), cells(table, "GATv2 and PPO: seed 0")
@@ -97,7 +97,7 @@ def test_verdicts(value, share, kind, text):
 def test_reproduction_lists_what_was_measured_only(tmp_path):
     write_evaluation(tmp_path, coverage=(0.9, 0.8))
     write_evaluation(tmp_path, "trees75", coverage=(0.9, 0.9), rate=0.3)
-    table = reproduction(read_results(tmp_path), "learned")
+    table = reproduction(read_results(tmp_path), "paper")
     assert cells(table, "GATv2 and PPO: coverage at 1000 steps") == {
         "statement of the paper (%)": "GATv2 and PPO: coverage at 1000 steps",
         "paper": "≥ 80",
@@ -112,7 +112,7 @@ def test_reproduction_lists_what_was_measured_only(tmp_path):
 def test_paired_differences_are_marked_by_who_is_ahead(tmp_path):
     write_evaluation(tmp_path, coverage=(0.9, 0.7), rate=0.1)
     write_evaluation(tmp_path, name="random", coverage=(0.5, 0.3), rate=0.0)
-    row = cells(differences(read_results(tmp_path), "learned"), "random walk")
+    row = cells(differences(read_results(tmp_path), "paper"), "random walk")
     assert row["arenas"] == "2" and row["coverage at the end"] == "**+40.0 ± 0.0**"
     assert row["interventions"] == "*+10.0 ± 0.0*"
     assert row["area to 500"] == "–"  # no such column in episodes.csv
@@ -123,7 +123,7 @@ def test_policies_in_other_arenas_are_not_paired(tmp_path):
     write_evaluation(tmp_path)
     other = write_evaluation(tmp_path, name="random") / "summary.json"
     other.write_text(other.read_text().replace('"seed": 0', '"seed": 1'))
-    assert differences(read_results(tmp_path), "learned") == ""
+    assert differences(read_results(tmp_path), "paper") == ""
 
 
 def test_other_forests(tmp_path):
@@ -142,7 +142,7 @@ def test_endings_say_who_is_stuck_and_why(tmp_path):
     write_evaluation(tmp_path, name="cost_published", coverage=(1, 1, 1, 0.05), endings=stuck)
     half = {"covered": 0.5, "budget": 0.5}
     write_evaluation(tmp_path, coverage=(0.99, 0.09), endings=half)
-    write_evaluation(tmp_path, name="learned_seed1", coverage=(0.99, 0.99))
+    write_evaluation(tmp_path, name="paper_seed1", coverage=(0.99, 0.99))
     table = endings(read_results(tmp_path))
     assert cells(table, "GATv2 and PPO") == {
         "policy": "GATv2 and PPO",
@@ -167,7 +167,7 @@ def test_the_summary_names_wins_and_losses(tmp_path):
     write_evaluation(tmp_path, name="cost_published", coverage=(0.9, 0.86), rate=0.0)
     write_evaluation(tmp_path, name="mmpf_published", coverage=(0.9, 0.9), rate=0.0)
     write_training(tmp_path / "training" / "seed0.csv", evaluated=(0.9, 0.8))
-    lines = summary(read_results(tmp_path), "learned").splitlines()
+    lines = summary(read_results(tmp_path), "paper").splitlines()
     reproduced, conditions, beats, beaten, steps = lines
     assert "the paper's 5 numbers about its policy, 4 are reached or passed" in reproduced
     assert "interventions, mean 30.0 ± 1.0 % (paper 10). Its benchmarks" in reproduced
@@ -183,7 +183,7 @@ def test_the_summary_names_wins_and_losses(tmp_path):
 def test_a_benchmark_that_ends_where_the_papers_does_holds(tmp_path):
     write_evaluation(tmp_path, name="cost_published", coverage=(0.88, 0.88))
     write_evaluation(tmp_path, name="mmpf_published", coverage=(0.90, 0.90))
-    cost, mmpf = findings(read_results(tmp_path), "learned")
+    cost, mmpf = findings(read_results(tmp_path), "paper")
     assert cost.holds and cost.verdict == "within the interval"
     assert not mmpf.holds and mmpf.verdict == "no: +12.0"
 
@@ -198,19 +198,19 @@ def test_a_benchmark_that_ends_where_the_papers_does_holds(tmp_path):
     ],
 )
 def test_the_last_step_ahead(tmp_path, theirs, step):
-    folders = [write_evaluation(tmp_path, name=name) for name in ("learned", "random")]
+    folders = [write_evaluation(tmp_path, name=name) for name in ("paper", "random")]
     for folder, curve in zip(folders, ((0.5, 0.6, 0.7), theirs), strict=True):
         rows = [f"{at},{x},{x},{x}" for at, x in zip((0, 500, 2500), curve, strict=True)]
         (folder / "curve.csv").write_text("\n".join(["step,mean,low,high", *rows]) + "\n")
     methods = read_results(tmp_path).settings["nominal"]
-    assert last_step_ahead(methods["learned"].first, methods["random"].first) == step
-    found = f"of random walk to step {step}." in summary(read_results(tmp_path), "learned")
+    assert last_step_ahead(methods["paper"].first, methods["random"].first) == step
+    found = f"of random walk to step {step}." in summary(read_results(tmp_path), "paper")
     assert found == (step is not None)
 
 
-def test_without_the_learned_policy_there_is_no_summary(tmp_path):
+def test_without_the_paper_policy_there_is_no_summary(tmp_path):
     write_evaluation(tmp_path, name="random")
-    assert summary(read_results(tmp_path), "learned") == ""
+    assert summary(read_results(tmp_path), "paper") == ""
 
 
 def test_trainings_of_both_networks_are_set_side_by_side(tmp_path):
