@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from forestrl.explorer.candidates import candidates
 from forestrl.explorer.compiled import Weights, residuals
 from forestrl.explorer.features import put_features
 from forestrl.kernels.compiling import compiled
+from forestrl.planners.viewpoints.candidates import candidates, distance_apart
 from forestrl.planners.viewpoints.guard import nearest_view, wavers
 from forestrl.planners.viewpoints.paths import Paths
 from forestrl.planners.viewpoints.scores import NOWHERE, Memory, linear, situation
 from forestrl.planners.viewpoints.sight import Sight
 from forestrl.planners.viewpoints.views import Views
-
-APART = 3
-"""How far apart candidates are at least, in fifths of the sensor's range."""
 
 
 @compiled
@@ -45,8 +42,7 @@ def compared(
     """
     here = situation(views, sight, stride, paths.order[0], memory)
     scores = linear(views, stride, paths, here, weights.linear)
-    apart = max(1, int(np.rint(APART * here.unit)))
-    cells = candidates(paths, stride, scores, apart, weights.most)
+    cells = candidates(paths, stride, scores, distance_apart(here.unit), weights.most)
     features = np.empty((len(cells), len(weights.mean)))
     if weights.most == 1 or len(cells) == 0:
         return cells, np.zeros(len(cells)), features

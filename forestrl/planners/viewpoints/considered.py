@@ -10,8 +10,6 @@ from forestrl.planners.viewpoints.paths import Paths
 from forestrl.planners.viewpoints.sight import Sight
 from forestrl.planners.viewpoints.views import Views
 
-_MOST, _APART = 16, 3  # viewpoints that are listed, and fifths of the range between two of them
-
 
 class Viewpoints(NamedTuple):
     """The viewpoints that a planner compared at one step, the best first."""
@@ -48,19 +46,6 @@ def compared(at: Outlook, cells: np.ndarray, scores: np.ndarray, goal: int) -> V
         goal = at.paths.before[goal]
     order = np.argsort(-scores, kind="stable")
     return Viewpoints(_places(at, cells[order]), scores[order], _places(at, way[::-1]))
-
-
-def spread(at: Outlook, cells: np.ndarray, scores: np.ndarray) -> np.ndarray:
-    """Picks the best few viewpoints, none close to a better one; gives their places in the list."""
-    apart = max(1, round(_APART * at.lines.lidar_range / 5))
-    picked: list[int] = []
-    places = _places(at, cells)
-    for i in np.argsort(-scores, kind="stable"):
-        if all(abs(places[i] - places[j]).max() >= apart for j in picked):
-            picked.append(int(i))
-        if len(picked) == _MOST:
-            break
-    return np.array(picked, np.int64)
 
 
 def _places(at: Outlook, cells: np.ndarray | list[int]) -> np.ndarray:

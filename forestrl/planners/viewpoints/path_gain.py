@@ -15,13 +15,15 @@ from forestrl.kernels.batches import grids, over_batch, rows
 from forestrl.kernels.compiling import compiled
 from forestrl.planners.base import ClassicalPlanner, Key
 from forestrl.planners.steps import EXPLORING, status_at_end
-from forestrl.planners.viewpoints.considered import Outlook, Viewpoints, compared, spread
+from forestrl.planners.viewpoints.candidates import candidates, distance_apart
+from forestrl.planners.viewpoints.considered import Outlook, Viewpoints, compared
 from forestrl.planners.viewpoints.paths import first_step, paths_from
 from forestrl.planners.viewpoints.scores import NOWHERE, path_gain
 from forestrl.planners.viewpoints.sight import Sight, sight
 from forestrl.planners.viewpoints.views import Views, blank, spend, update
 from forestrl.settings import Range, checked
 
+_LISTED = 16  # viewpoints, at most, for a reader of the episode
 GRID, SEEN, COUNTS = ("planner", "grid"), ("planner", "seen"), ("planner", "counts")
 """What could be seen, kept up from step to step: the parts of ``Views``."""
 
@@ -73,11 +75,13 @@ class PathGain(ClassicalPlanner):
     def viewpoints(self, step: TensorDictBase) -> Viewpoints:
         """Gives the best viewpoints of a state without batch dimensions, before the decision."""
         at = outlook(step, self.lidar_range)
-        cells = at.paths.order[1:][at.paths.gains[at.paths.order[1:]] > 0]
-        gain = (at.paths.gains + at.views.counts)[cells]
-        scores = gain / at.paths.lengths[cells].astype(float) ** self.power
-        few = spread(at, cells, scores)
-        return compared(at, cells[few], scores[few], path_gain(at.views, at.paths, self.power))
+        shows = at.paths.gains > 0
+        scores = np.full(len(shows), -np.inf)
+        gain = (at.paths.gains + at.views.counts)[shows]
+        scores[shows] = gain / at.paths.lengths[shows].astype(float) ** self.power
+        apart = distance_apart(self.lidar_range / 5)
+        few = candidates(at.paths, at.stride, scores[at.paths.order], apart, _LISTED)
+        return compared(at, few, scores[few], path_gain(at.views, at.paths, self.power))
 
 
 def outlook(step: TensorDictBase, lidar_range: float) -> Outlook:

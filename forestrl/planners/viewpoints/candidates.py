@@ -7,6 +7,14 @@ import numpy as np
 from forestrl.kernels.compiling import compiled
 from forestrl.planners.viewpoints.paths import Paths
 
+_APART = 3  # units
+
+
+@compiled
+def distance_apart(unit: float) -> int:
+    """Gives how far apart candidates are at least, cells; ``unit`` is a fifth of the range."""
+    return max(1, int(np.rint(_APART * unit)))
+
 
 @compiled
 def candidates(paths: Paths, stride: int, scores: np.ndarray, apart: int, most: int) -> np.ndarray:
