@@ -21,7 +21,7 @@ from omegaconf import DictConfig, OmegaConf
 from forestrl import records, runs
 from forestrl.command_line import prepare_words, typed
 from forestrl.config import CONF_DIR, check_all, kinds_of, leaves
-from forestrl.errors import USER_ERRORS, describe, with_whole_names
+from forestrl.errors import describe, is_users, with_whole_names
 from forestrl.settings import is_path
 from forestrl.stopping import Stopped, saved, stopping
 from forestrl.terminal import lasting_output
@@ -101,7 +101,7 @@ def _in_one_line(name: str, job: Job) -> Job:
                 stopped.how_to_go_on = f"forestrl {name} {typed('resume', run_folder(cfg))}"
             raise
         except Exception as error:
-            user_error = isinstance(error, USER_ERRORS) and not _debug()
+            user_error = is_users(error) and not _debug()
             text = with_whole_names(describe(error), cfg)
             if _is_swept():
                 _note(text if user_error else "".join(traceback.format_exception(error)))
@@ -149,7 +149,7 @@ def _run(name: str, entry: Callable[[], Any]) -> Any:
         _fail(name, describe(refusal.__cause__ or refusal))
     except Exception as error:
         failed = _failed_jobs(runs.sweep_folder())
-        if _debug() or not (failed or isinstance(error, USER_ERRORS)):
+        if _debug() or not (failed or is_users(error)):
             raise
         _fail(name, *(failed or [describe(error)]))
     finally:

@@ -11,8 +11,24 @@ from omegaconf.errors import OmegaConfBaseException
 from forestrl.config import followed, leaves
 from forestrl.wording import nearest
 
-USER_ERRORS = (ValueError, OSError, HydraException, OmegaConfBaseException)
-"""What a user can mend: said without a traceback."""
+_USER_ERRORS = (ValueError, OSError, HydraException, OmegaConfBaseException)
+_EXTRAS = {
+    "cma": "search",
+    "pandas": "report",
+    "tabulate": "report",
+    "wandb_workspaces": "dashboard",
+}
+"""Libraries that only an extra of the package installs, and that extra."""
+
+
+def is_users(error: BaseException) -> bool:
+    """Tells whether it is an error that a user can mend: it is said without a traceback."""
+    return isinstance(error, _USER_ERRORS) or _missing_extra(error) is not None
+
+
+def _missing_extra(error: BaseException) -> str | None:
+    missing = isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0]
+    return _EXTRAS.get(missing) if missing else None
 
 
 def describe(error: BaseException) -> str:
@@ -23,12 +39,14 @@ def describe(error: BaseException) -> str:
         node = re.search(r"full_key: ([\w.]+)", str(error))
         made = (f"{node[1]}: " if node else "") + target[1] if target else made
         error = error.__cause__
+    if extra := _missing_extra(error):
+        return f'this needs pip install "forestrl[{extra}]"'
     text = " ".join(str(error).split()).partition(" Config search path:")[0]
     if unknown := re.search(r"Could not override '([^']+)'", text):
         return f"there is no setting {unknown[1]}{_meant(unknown[1], error.__cause__)}"
     if text.startswith("Error merging override") and error.__cause__ is not None:
         return f"{text}: {str(error.__cause__).splitlines()[0]}"
-    if made and not isinstance(error, USER_ERRORS):
+    if made and not isinstance(error, _USER_ERRORS):
         return f"{made} cannot be made: {type(error).__name__}: {text}; debug=true shows where"
     return text
 

@@ -1,5 +1,6 @@
 """What is not allowed is said in one line, with its name, its value and what is."""
 
+import os
 import re
 import subprocess
 import sys
@@ -269,3 +270,27 @@ def test_the_process_ends_with_the_status_and_only_debug_prints_a_traceback(tmp_
         assert result.returncode == 1
         assert ("Traceback (most recent call last)" in result.stderr) is traced
         assert traced or result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "library", "extra"),
+    [
+        ("figures", "pandas", "report"),
+        ("figures", "tabulate", "report"),
+        ("train experiment=linear algo.generations=1 eval.arenas=1", "cma", "search"),
+        ("dashboard", "wandb_workspaces", "dashboard"),
+    ],
+)
+def test_a_library_of_an_extra_that_is_missing_is_said_in_one_line(words, library, extra, tmp_path):
+    code = (
+        f"import sys; sys.modules[{library!r}] = None; "
+        f"sys.argv = ['forestrl', *{words.split()!r}]; "
+        "from forestrl.cli import main; main()"
+    )
+    run = [sys.executable, "-c", code]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    result = subprocess.run(run, capture_output=True, text=True, cwd=tmp_path, env=environment)
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1].endswith(f'this needs pip install "forestrl[{extra}]"')
+    assert "Traceback" not in result.stderr
+    assert not list(tmp_path.glob("*.log"))

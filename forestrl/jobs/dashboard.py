@@ -6,12 +6,8 @@ from typing import Any
 
 import wandb
 from omegaconf import DictConfig
-
-try:
-    from wandb_workspaces import workspaces
-    from wandb_workspaces.reports import v2 as panels
-except ModuleNotFoundError as error:
-    raise ValueError('this needs pip install "forestrl[dashboard]"') from error
+from wandb_workspaces import workspaces
+from wandb_workspaces.reports import v2 as panels
 
 SECTIONS: dict[str, dict[str, tuple[str, ...]]] = {  # section: panel: its curves
     "Does it explore?": {
@@ -52,7 +48,7 @@ EPISODE = "eval/episode"
 
 def run(cfg: DictConfig) -> None:
     """Saves the workspace, and prints its address."""
-    if not wandb.api.api_key:
+    if not wandb.login(prompt=False, verify=False):
         raise ValueError("nobody is logged in: run `wandb login`, or set WANDB_API_KEY")
     try:
         entity = cfg.entity or wandb.Api(timeout=19).default_entity
