@@ -9,6 +9,8 @@ from omegaconf import DictConfig
 from wandb_workspaces import workspaces
 from wandb_workspaces.reports import v2 as panels
 
+from forestrl.loggers.wandb import logged_in, service
+
 SECTIONS: dict[str, dict[str, tuple[str, ...]]] = {  # section: panel: its curves
     "Does it explore?": {
         "coverage in the evaluation": ("eval/coverage", "eval/auc"),
@@ -48,7 +50,7 @@ EPISODE = "eval/episode"
 
 def run(cfg: DictConfig) -> None:
     """Saves the workspace, and prints its address."""
-    if not wandb.login(prompt=False, verify=False):
+    if not logged_in(service()):
         raise ValueError("nobody is logged in: run `wandb login`, or set WANDB_API_KEY")
     try:
         entity = cfg.entity or wandb.Api(timeout=19).default_entity

@@ -120,8 +120,8 @@ def _mode() -> Any:
     asked = os.environ.get("WANDB_MODE", "")
     if asked not in ("", "online"):
         return asked
-    host = os.environ.get("WANDB_BASE_URL") or "https://api.wandb.ai"
-    if not _logged_in(host):
+    host = service()
+    if not logged_in(host):
         if asked:
             _say(f"WANDB_MODE={asked} needs a login, see wandb login")
         return _OFFLINE
@@ -135,7 +135,12 @@ def _say(why: str) -> None:
     print(f"wandb: {why}: the run is written offline, to be sent by wandb sync", file=sys.stderr)
 
 
-def _logged_in(host: str) -> bool:
+def service() -> str:
+    """Gives the address of the service that is asked for."""
+    return os.environ.get("WANDB_BASE_URL") or "https://api.wandb.ai"
+
+
+def logged_in(host: str) -> bool:
     """Tells whether this user has a key, without asking the network."""
     if os.environ.get("WANDB_API_KEY"):
         return True
